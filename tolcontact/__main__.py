@@ -26,7 +26,7 @@ def command_line() -> None:
             machine.skip_plugins()
             gc.set_threshold(MIN_GARBAGE)
             _imported()()
-    except KeyboardInterrupt:  # between the end of a command and that of the process
+    except KeyboardInterrupt:  # after the end of a command, before the process ends
         interrupts.end("stopped")
 
 

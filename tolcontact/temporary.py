@@ -23,7 +23,7 @@ def temporary_folder() -> Iterator[Path]:
 
 
 def remove_abandoned_folders() -> None:
-    """Remove folders of killed runs. The system has released their locks; those of other users cannot be opened."""
+    """Remove folders of killed runs. The system has released their locks; locks of other users cannot be opened."""
     for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
         with contextlib.suppress(OSError, Timeout):
             if not folder.is_symlink() and time.time() - folder.stat().st_mtime > MIN_AGE:

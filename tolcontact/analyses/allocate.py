@@ -254,7 +254,7 @@ class Search:
                 break
             if slopes is None:
                 slopes = self._slopes(trial)
-                scales = np.abs(slopes).sum(axis=1)  # margins in mm and in rad count alike
+                scales = np.abs(slopes).sum(axis=1)  # margins in mm and in rad count equally
                 scales[scales == 0] = 1.0
                 penalty = PENALTY * self.cost(trial.logs) / scales
             logs = self._step(margins / scales, slopes / scales[:, None], trial.logs, radius)

@@ -13,7 +13,7 @@ from tolcontact.declaration.tolerance_class import GRADES, ToleranceClass, Undef
 from tolcontact.errors import OptionError
 
 MIN_FACTOR, MAX_FACTOR = 0.1, 3.0  # times the present range, where a cost is no table
-GRID = 40  # factors that stand for a range that may have any width, next to tables
+GRID = 40  # factors that represent a range of any width, next to tables
 Cost = float | Callable[[float], float] | Mapping[float | str, float]
 
 

@@ -91,7 +91,7 @@ class Requirement:
         return self._share_margin(x, self.value) if self.is_share else self._capability_margin(x, self.value)
 
     def smooth_margin(self, x: np.ndarray) -> float:
-        """Return the margin with the means of quantiles around those of `margin`, for slopes."""
+        """Return the margin with the means of quantiles around the quantiles of `margin`, for slopes."""
         spread = min(SPREAD, self.share**-0.5)
         shares = self.share * np.geomspace(1 / spread, spread, 16)
         return self._share_margin(x, shares) if self.is_share else self._capability_margin(x, self.value, shares)

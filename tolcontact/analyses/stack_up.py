@@ -1,4 +1,4 @@
-"""The figures of a tolerance stack: worst case, RSS and inflated RSS by the linear model, beside the Monte Carlo range.
+"""The figures of a tolerance stack: worst case, RSS and inflated RSS by the linear model, compared with the Monte Carlo range.
 
 With the contribution t_i of contributor i, half the range of its slope times its zone, and n of them that vary:
 

@@ -56,7 +56,7 @@ class ContactQP:
 
     energy       poses, raw, moments, deviations -> the objective at `poses` (realization, 1) [mm^2], or [mm] for seating
     relate       poses, deviations -> X_RM of the pairs at `poses`
-    slacks       number of slacks: the QP's last variables, which are not negative, except for those of elastic parts
+    slacks       number of slacks: the QP's last variables, which are not negative, except for slacks of elastic parts
     has_springs  whether any row is compliant
     equations    number of equations: the QP's last rows, for two-sided locators that the objective makes exact
     standing     for each pair of the group the contact points that always have a row, or the number of its slots
@@ -126,7 +126,7 @@ def contact_qp(
 
     `standing` lists the points of each pair of the group that always have a row, by default from `standing_points`. `call`
     evaluates what recurs, by default in place, or with many bodies by FunctionCalls; both give the same results up to rounding.
-    `flexibility` is that of the rows if there are elastic parts.
+    `flexibility` belongs to the rows if there are elastic parts.
     `_inputs` describes the inputs. The outputs for `p` parts, `q` pairs and `k` rows are:
 
     corrected (12 p)     poses after the correction; in an exact resolution after the share of it that `stride` allows

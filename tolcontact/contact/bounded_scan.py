@@ -134,34 +134,34 @@ def bounded_scan(
     depth: float = np.inf,
     guard: Guard | None = None,
     parting: Parting | None = None,
-    carried: Int[Array, "n slot"] | None = None,
+    former_labels: Int[Array, "n slot"] | None = None,
     deepest: Float[Array, " n"] | None = None,
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see raised_places for the other arguments.
 
     If bodies interfere and no place shows penetration, a `guard` adds one, and finds it again while it is active. A `parting`
     leaves out places that separate the bodies in other directions than the best one, and adds the place for the best direction;
-    `carried` (n, slot) are the labels of places that were active before, -1 for none. Places deeper than `deepest` (n,) [mm] do
+    `former_labels` (n, slot) are of places that were active before, -1 for none. Places deeper than `deepest` (n,) [mm] do
     not count.
     """
     raised = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
     if deepest is not None:
         raised = raised.only(raised.gaps >= -deepest[:, None])
     if guard is not None:
-        raised = _with_guard(raised, guard, X_RM, carried)
+        raised = _with_guard(raised, guard, X_RM, former_labels)
     if parting is not None:
-        raised = _with_parting(raised, parting, X_RM, carried)
+        raised = _with_parting(raised, parting, X_RM, former_labels)
     return BoundedScan(meeting, SearchedPlaces.of(raised))
 
 
-def _with_guard(raised: RaisedPlaces, guard: Guard, X_RM: np.ndarray, carried: np.ndarray | None) -> RaisedPlaces:
+def _with_guard(raised: RaisedPlaces, guard: Guard, X_RM: np.ndarray, former_labels: np.ndarray | None) -> RaisedPlaces:
     """Return places with one more where bodies interfere and no place shows it.
 
-    If such a place was active before (`carried` (n, k)), it is found again: otherwise bodies would interfere again at once.
+    If such a place was active before (`former_labels` (n, k)), it is found again: else bodies would interfere again at once.
     """
     labels = np.full(len(X_RM), -1)
-    if carried is not None:
-        labels = np.where(is_guard(carried), carried, -1).max(axis=1, initial=-1)
+    if former_labels is not None:
+        labels = np.where(is_guard(former_labels), former_labels, -1).max(axis=1, initial=-1)
     rows = np.flatnonzero((labels >= 0) | (raised.gaps.min(axis=1, initial=np.inf) >= -PENETRATION))
     extra = no_places(len(X_RM))
     for values, of_rows in zip(extra, guard.places(X_RM[rows], labels[rows]), strict=True):
@@ -169,11 +169,11 @@ def _with_guard(raised: RaisedPlaces, guard: Guard, X_RM: np.ndarray, carried: n
     return raised.followed_by(unraised(extra))
 
 
-def _with_parting(raised: RaisedPlaces, parting: Parting, X_RM: np.ndarray, carried: np.ndarray | None) -> RaisedPlaces:
+def _with_parting(raised: RaisedPlaces, parting: Parting, X_RM: np.ndarray, former_labels: np.ndarray | None) -> RaisedPlaces:
     """Return places that separate convex bodies in the best direction, and the best place.
 
     Bodies are free once they are separate in one direction; penetrating places with other normals would push them as well. The
-    separating place is added where no other place shows as much. Nearly parallel edges that were active before (`carried`
+    separating place is added where no other place shows as much. Nearly parallel edges that were active before (`former_labels`
     (n, k)) are added, too.
     """
     axis = parting.at(X_RM)
@@ -183,8 +183,8 @@ def _with_parting(raised: RaisedPlaces, parting: Parting, X_RM: np.ndarray, carr
     is_new = axis.gaps < shown - SHOWN_SHARE * np.maximum(np.abs(axis.gaps), INSIDE)
     labels = np.where(is_new, PARTING + axis.labels, -1)
     added = [axis._replace(labels=labels, gaps=np.where(is_new, axis.gaps, np.inf))]
-    if carried is not None:
-        edges = np.where((carried >= PARTING) & (carried != labels), carried - PARTING, -1)
+    if former_labels is not None:
+        edges = np.where((former_labels >= PARTING) & (former_labels != labels), former_labels - PARTING, -1)
         crossings = parting.crossings(X_RM, edges, axis.n_r[:, 0])
-        added.append(crossings._replace(labels=np.where(np.isfinite(crossings.gaps), carried, -1)))
+        added.append(crossings._replace(labels=np.where(np.isfinite(crossings.gaps), former_labels, -1)))
     return raised.followed_by(*map(unraised, added))

@@ -149,10 +149,10 @@ class Candidates:
         for k, scan in enumerate(self._carrying_scans):
             X_RM, former = relative[:, k], earlier[k] if earlier else None
             if k in self.bounded:
-                carried = slots[self._varying.index(k)].labels if slots and (width > 0 or start.guarded) else None
-                kept = None if carried is None or width == 0 else self._kept(carried, former, at_rest)
+                former_labels = slots[self._varying.index(k)].labels if slots and (width > 0 or start.guarded) else None
+                kept = None if former_labels is None or width == 0 else self._kept(former_labels, former, at_rest)
                 limits = np.full(len(X_RM), self.free_depth) if start.free and deepest is None else deepest
-                scans.append(self._bounded(k, X_RM, deviations, start, kept, width, carried, limits))
+                scans.append(self._bounded(k, X_RM, deviations, start, kept, width, former_labels, limits))
             elif start.projected and k in self._margins:
                 scans.append(self.projected(k, X_RM))
             elif self._pairs[k].has_form:
@@ -177,7 +177,7 @@ class Candidates:
         start: Start,
         kept: np.ndarray | None,
         width: float,
-        carried: np.ndarray | None,
+        former_labels: np.ndarray | None,
         limits: np.ndarray | None,
     ) -> BoundedScan:
         """Return the scan of a bounded pair at X_RM (n, 12), see `scans` and bounded_scan."""
@@ -191,7 +191,7 @@ class Candidates:
             depth=self._bulge if k in self._with_minima else np.inf,
             guard=self.guards.get(k) if start.guarded else None,
             parting=self.partings.get(k) if start.parted else None,
-            carried=carried,
+            former_labels=former_labels,
             deepest=limits,
         )  # fmt: skip
 

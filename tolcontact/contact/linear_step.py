@@ -38,7 +38,7 @@ class LinearStep:
         self._remembers = program.solver.remembers
         self._max_residual = MAX_RESIDUAL * group.group.length
         self.spans = group.qp.spans
-        # Reactions of contact push; those of two-sided locators at elastic parts pull, too.
+        # Reactions of contact push; two-sided locators at elastic parts pull, too.
         flexibility = group.qp.flexibility
         self.bends = flexibility is not None
         self._least_reaction: float | np.ndarray = 0.0 if flexibility is None else np.where(flexibility.holds, -np.inf, 0.0)

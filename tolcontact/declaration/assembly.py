@@ -153,7 +153,7 @@ class Assembly(Mirroring, Pictured, Checked):
         at         (x, y, z) [mm] of its frame in the nominal assembly; by default the origin
         rotation   rotation vector [rad], by default 0; tc.degrees(0, 0, 90) is a quarter turn about z
         fixed      True: contact does not move it; None (default): it is free if it is the moving side of a pair (see Part)
-        standard   of its drawing, "ISO" or "ASME"; by default that of the assembly
+        standard   of its drawing, "ISO" or "ASME"; by default the assembly's
         mirror     axis of its frame that is reversed, "x", "y" or "z": the part is a mirror image (see `mirrored`)
 
         `block = model.part("block", tc.Box(60, 40, 20), at=(30, 20, 10))`

@@ -140,7 +140,7 @@ class Declarations:
         tolerance   width of its limits about the nominal value [mm or rad], or "+0.2/-0.1"
         limits      (lower, upper) values in place of a tolerance; None for an open side
         absolute    True: values are coordinates or distances; False: they are differences from nominal
-        units       of its values and limits: "in", "um", ... for lengths, by default those of the assembly; "deg" for angles,
+        units       of its values and limits: "in", "um", ... for lengths, by default the assembly's; "deg" for angles,
                     by default "rad"; of a function, what it returns, by default mm
 
         `model.measure("flush", lid.point(100, 30, 4), to=base.point(100, 30, 24), along="x", limits=(-0.2, 0.2))`

@@ -33,7 +33,7 @@ class Elastic(Checked):
     density    [kg/m^3], which `assembly.gravity` needs
     stiffness  file with the stiffness matrix [N/mm] of a finite-element program, without supports, in place of E and nu
     nodes      file with the nodes [mm] of that matrix, in the frame of the part
-    pad        [mm] radius over which a force at a point is spread; by default that of the body
+    pad        [mm] radius over which a force at a point is spread; by default the body's
     """
 
     E: float | None = None

@@ -19,7 +19,7 @@ UNIT_NAMES = {"um": "micrometres", "in": "inches", "m": "metres", "cm": "centime
 
 
 def grade_width(grade: str, size: float) -> float:
-    """Return the width [mm] of a standard tolerance grade of ISO 286-1 for a size; beyond its table that of its last sizes."""
+    """Return the width [mm] of a tolerance grade of ISO 286-1 for a size; beyond its table the one of its last sizes."""
     widths = WIDTHS[grade].split()
     return float(widths[min(bisect_left(list(map(float, RANGES.split())), size), len(widths) - 1)]) / 1000
 

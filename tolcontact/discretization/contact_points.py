@@ -117,7 +117,7 @@ def _spring_shares(points: ContactPoints) -> np.ndarray:
     shares = points.weights / len(points.P_m)
     if shares.min() >= MIN_SHARE / len(shares):
         return shares
-    shares = np.maximum(shares, MIN_SHARE / len(shares))  # a corner may stand for no area
+    shares = np.maximum(shares, MIN_SHARE / len(shares))  # a corner may represent no area
     return shares / shares.sum()
 
 

@@ -13,7 +13,7 @@ SIGMA_QUANTILES = np.array([0.1587, 0.5, 0.8413])
 
 
 def scales(nominal: Nominal) -> dict[str, Scale]:
-    """Return the scales of locators and features by their labels; only those of locators and sizes have zones."""
+    """Return the scales of locators and features by their labels; only locators and sizes have zones."""
     by_label = dict[str, Scale]()
     for part in nominal.parts:
         R_WP, t_WP = part.placement

@@ -32,7 +32,7 @@ class Features:
 
     first_column  of the freedoms of features
     mated         faces of contact pairs: contact decides where such a datum at its material boundary lies
-    causes        variables, whose columns follow those of features
+    causes        variables, whose columns follow the columns of features
     """
 
     first_column: int

@@ -62,7 +62,7 @@ class NominalPattern:
 
     @property
     def is_gauge(self) -> bool:
-        """Whether its freedoms are those of the gauge element of a datum (see datum_mobility)."""
+        """Whether it is the gauge element of a datum (see datum_mobility)."""
         return self.members[0].mobility is not None
 
     @property

@@ -100,7 +100,7 @@ def _translations(tolerance: GeometricTolerance, pattern: NominalPattern, added:
 def _controlled(rows: Sequence[np.ndarray], pattern: NominalPattern, frame: DatumFrame, *, is_combined: bool) -> np.ndarray:
     """Return the directions (coordinate, n) that the zone limits and that no free motion of the datum frame changes.
 
-    Combined zones of members move as one, other ones each by itself.
+    Combined zones of members move as one, other ones each alone.
     """
     limited = _span(np.asarray(scipy.linalg.block_diag(*(member.reshape(-1, member.shape[-1]).T for member in rows))))
     motions = pattern.values @ frame.free

@@ -26,7 +26,7 @@ class Solid:
     sides       (e, 2): the triangles at each edge, the same one twice where the other has no area
     flat        (n, 2): triangles that share an edge and lie in one plane
     sources     (t,): the triangle of the part's mesh that each triangle is
-    normals     (t, 3) outward, of unit length; triangles without an area have that of their plane
+    normals     (t, 3) outward, of unit length; triangles without an area have the normal of their plane
     """
 
     vertices: Float[Array, "v 3"]

@@ -6,7 +6,7 @@ from typing import Any
 
 from tolcontact.texts import clipped
 
-IGNORED = "declared_at", "title_block"  # lines of a script; the title block is stated by itself
+IGNORED = "declared_at", "title_block"  # lines of a script; the title block is stated elsewhere
 MAX_VALUE = 60  # characters of a value
 
 

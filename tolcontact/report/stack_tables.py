@@ -11,7 +11,7 @@ from tolcontact.report.figures import grouped, number
 from tolcontact.report.table import Table
 from tolcontact.statistics.capability import MIN_TAIL
 
-WIDENING = 3.29 / 1.96  # from intervals of 95 % to those of 99.9 %, beyond which RSS misses the range
+WIDENING = 3.29 / 1.96  # from 95 % intervals to 99.9 % intervals, beyond which RSS misses the range
 NOTES = (
     "worst case, RSS: zones times sensitivities at the nominal assembly, about the centred value.",
     "MRSS: RSS times the factor of Drake (ch. 9). 1.5 RSS: Bender.",

@@ -210,7 +210,7 @@ def _hand_over(
     """Place the joints of a station again if contact in earlier stations has changed them, and return whether it did.
 
     rows               realizations that contact in earlier stations has changed
-    initial, relative  poses, and X_RM of the pairs, before contact is resolved; those of this station are replaced
+    initial, relative  poses, and X_RM of the pairs, before contact is resolved; values of this station are replaced
     corrected          corrected poses of earlier stations, and raw poses of this station, which are replaced, too
     """
     if station.place is None or not rows.size:

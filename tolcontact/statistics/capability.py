@@ -154,7 +154,7 @@ def as_normal(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
 def _side(x: Sample, spread: Estimate, limit: float, sign: float) -> Estimate:
     """Return the index of one side for a normal distribution; `sign` is 1 for the upper limit, -1 for the lower.
 
-    The distances of its bounds are those of the mean and of the `spread` 6 sigma, which add up like errors. Their correlation
+    The distances of its bounds add up from the mean and the `spread` 6 sigma, like errors. Their correlation
     follows from skewness and kurtosis. Small samples and heavy tails use it only where it widens the interval, since few skewed
     values do not prove that two errors cancel.
     """

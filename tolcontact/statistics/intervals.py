@@ -72,7 +72,7 @@ def _from_sums(estimate: float, count: int, squares: float, cubes: float, fourth
     """Return an estimate whose influence function over `count` realizations has sums of powers.
 
     The fourth powers give the effective degrees of freedom of Student's t: there are fewer if the spread comes from few
-    realizations. The interval contains that of Hall's transformation, which accounts for skewed influences.
+    realizations. The interval contains the one by Hall's transformation, which accounts for skewed influences.
     """
     if not squares > 0:
         return Estimate(float(estimate), float(estimate), float(estimate))

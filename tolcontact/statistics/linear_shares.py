@@ -10,7 +10,7 @@ Nonlinear effects of contact are in 1 - R^2, and in no share. With C the covaria
 
     (b_g.x_g y + cov(x_g, y).(C^-1 x)_g e - S_g y^2) / var(y),     e without the share that a realization has in its own fit.
 
-The interval of a share is that of the mean of these influences or, if wider, the same on the logit scale: a share lies
+The interval of a share is the interval of the mean of these influences or, if wider, the same on the logit scale: a share lies
 between 0 and 1. Its bounds are apart by the largest influences more, since one more realization of that kind could have been
 drawn. A share has no interval if the variance of a contributor of its group comes from few realizations. The residuals of few
 realizations, or those with heavy tails, do not tell how much no line explains.

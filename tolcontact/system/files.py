@@ -104,7 +104,7 @@ def remove_held(path: Path, release: Callable[[], object]) -> None:
 
 
 def is_link(status: os.stat_result) -> bool:
-    """Return whether the status from `lstat` is that of a link, or of a junction of Windows."""
+    """Return whether the status from `lstat` belongs to a link, or of a junction of Windows."""
     junction = getattr(stat, "IO_REPARSE_TAG_MOUNT_POINT", None)
     return stat.S_ISLNK(status.st_mode) or (junction is not None and getattr(status, "st_reparse_tag", None) == junction)
 

@@ -95,7 +95,7 @@ class RunSums:
     def __init__(self, program: Program, run: Run) -> None:
         self._program, self._seed = program, run.seed
         self._fields = DisplacementFields(program.nominal, str(run.fields))
-        pairs = program.nominal.pairs  # without those of elastic parts, which touch where they are bent
+        pairs = program.nominal.pairs  # without pairs of elastic parts, which touch where they are bent
         self._is_counted = np.concatenate([np.zeros(0, dtype=bool), *(np.full(len(p.P_m), not p.elastic) for p in pairs)])
 
     @property
