@@ -60,7 +60,7 @@ def nist_ctc_01(times: float = 1) -> tc.Assembly:
     path.write_bytes(gzip.decompress(NIST.read_bytes()))
     model = tc.Assembly("CTC 01", standard="ASME")
     declared = tc.io.features_from_pmi(model.part("part", tc.Mesh(path), fixed=True))
-    slot = next(feature for feature in declared.features if feature.name == "slot 38")
+    slot: Any = next(feature for feature in declared.features if feature.name == "slot 38")
     model.measure("slot", slot.point(-107.5, 117.5, -16.67), along="x")
     return model
 
@@ -75,8 +75,8 @@ def eight_holes(times: float = 1) -> tc.Assembly:
     walls = tc.select.Cylinder(inner=True)
     holes = [part.face(walls, tc.select.Inside((x - 9, y - 9, -1), (x + 9, y + 9, 11))) for x, y in places]
     pattern = part.pattern("holes", *holes, tc.Size(12, 0.05, -0.05), tc.Position(times * 0.1, "A|B|C"))
-    first, last = pattern.members[0], pattern.members[3]
-    model.measure("distance", tc.AxisDistance(first, last, across="z"))
+    first, last = pattern.members[0].faces[0], pattern.members[3].faces[0]
+    model.measure("distance", tc.AxisDistance(first, last, across=(0, 0, 1)))
     return model
 
 
@@ -145,10 +145,10 @@ def drilled(size: tuple[float, float, float], holes: Mapping[Place, float]) -> t
     return trimesh.boolean.difference([slab, *drills], engine="manifold")
 
 
-def plate(model: tc.Assembly, name: str, z: float, diameter: float, *tolerances: Any, **options: bool) -> tuple[Any, Any]:
+def plate(model: tc.Assembly, name: str, z: float, diameter: float, *tolerances: Any, fixed: bool) -> tuple[Any, Any]:
     """Return a plate of 60 x 40 x 8 mm with datums A, B and C, and its two holes."""
     places = [(15.0, 20.0), (45.0, 20.0)]
-    part = model.part(name, tc.Mesh(drilled((60, 40, 8), dict.fromkeys(places, diameter))), at=(0, 0, z), **options)
+    part = model.part(name, tc.Mesh(drilled((60, 40, 8), dict.fromkeys(places, diameter))), at=(0, 0, z), fixed=fixed)
     part.feature("A", part.face("-z"), datum="A")
     part.feature("B", part.face("-y"), datum="B")
     part.feature("C", part.face("-x"), datum="C")
@@ -167,7 +167,7 @@ def located(model: tc.Assembly, upper: Any) -> None:
 def failing(model: tc.Assembly) -> str:
     """Return the percentage of realizations that cannot be assembled, with its interval."""
     with tc.run(model, samples=SAMPLES, fields="none", surfaces=0) as results:
-        status = results["status"].values
+        status = results.to_dataset()["status"].values
     count = int((status == Status.NOT_ASSEMBLABLE).sum())
     lost = int(np.isin(status, [Status.NOT_CONVERGED, Status.DOUBTFUL]).sum())
     interval = binomtest(count, len(status)).proportion_ci()
