@@ -48,7 +48,6 @@ class SolverChoice(ABC):
     options     its options, which archives state
     fallbacks   names of the solvers that answer in its place, tried in order, if its answer misses ACCURACY
     remembers   whether it starts each problem from the previous answer
-    bends       whether it solves QPs with elastic parts
     growth      the time of a problem grows with this power of the number of coupled bodies
     """
 
@@ -57,7 +56,6 @@ class SolverChoice(ABC):
     fallbacks: tuple[str, ...] = ("qpoases", "daqp", "piqp")
     remembers: bool = False
     growth: int = 3
-    bends: bool = True
 
     @abstractmethod
     def is_usable(self) -> bool:

@@ -245,7 +245,7 @@ class ContactResolver:
         energy = self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
         if self.flexibility is None:
             return energy
-        bent = self.flexibility.openings(state.multipliers) - self.flexibility.opening
+        bent = self.flexibility.bent(state.multipliers)
         return np.asarray(energy + (state.multipliers * bent).sum(axis=1) / 2 / self._force)
 
     def _at_nominal(self, task: Task) -> tuple[np.ndarray, np.ndarray]:

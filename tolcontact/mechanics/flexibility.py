@@ -23,6 +23,7 @@ from tolcontact.discretization import Nominal, NominalPart, Weld
 from tolcontact.elasticity import ElasticBody, MatrixSource, MeshSource, elastic_body, flexibility
 from tolcontact.errors import Faults, GeometryFault, designation
 from tolcontact.mechanics.groups import Group, Load
+from tolcontact.mechanics.opening_kernel import add_openings
 
 NULL = 1e-14  # of the largest eigenvalue of C, scaled to a unit diagonal: smaller ones are rounding
 SAME = 1e-12  # of the largest eigenvalue: of fewer motions at two-sided locators than there are locators
@@ -64,8 +65,13 @@ class Flexibility:
     def openings(self, reactions: Float[Array, "realization row"]) -> Float[Array, "realization row"]:
         """Return the openings (realization, row) [mm] under reactions [N] of the rows, summed up in a fixed order."""
         openings = np.tile(self.opening, (len(reactions), 1))
-        for row in np.flatnonzero(reactions.any(axis=0)):
-            openings += reactions[:, row, None] * self.C[row]
+        add_openings(self.C, np.ascontiguousarray(reactions), openings)
+        return openings
+
+    def bent(self, reactions: Float[Array, "realization row"]) -> Float[Array, "realization row"]:
+        """Return C l (realization, row) [mm]: the openings under reactions [N] of the rows, without those by constant forces."""
+        openings = np.zeros(reactions.shape)
+        add_openings(self.C, np.ascontiguousarray(reactions), openings)
         return openings
 
 
