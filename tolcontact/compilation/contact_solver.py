@@ -28,7 +28,6 @@ class ContactSolver:
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
         self._order = band_order(qp.sparsity("h"), qp.sparsity("a"), slacks=qp.slacks)
         self._equalities = qp.equalities
-        self._pair_of_row = np.repeat(np.arange(len(qp.spans)), [span.stop - span.start for span in qp.spans])
         self._kernel = None if qp.elastic is None else SOLVERS["graph"].solver(qp)
         self._max_dense = max(MAX_DENSE_ENTRIES // (sum(qp.sparsity("a").shape) + qp.slacks) ** 2, 1)
         self._start_with(choice.solver(qp))
@@ -169,16 +168,15 @@ class ContactSolver:
         return solution | {"x": np.hstack([x, slacks]), "lam_x": np.hstack([lam_x, np.zeros_like(slacks)])}
 
     def _finished(self, arrays: Arrays) -> Arrays:
-        """Return the outputs of `finish`; elastic parts bend by the reactions, and pairs may open by a `depth`."""
+        """Return the outputs of `finish`; elastic parts bend by the reactions, and rows in conflict are `opened`."""
         elastic, size = self._qp.elastic, self._qp.assemble.size1_out("h")
         if elastic is not None:
-            depth = arrays.get("depth", np.zeros((len(arrays["x"]), len(self._qp.spans))))
             bent = elastic.flexibility.bent(elastic.reactions(arrays["lam_a"], arrays["length"]))
-            bent += np.where(elastic.flexibility.holds, 0, depth[:, self._pair_of_row])
+            bent += arrays.get("opened", 0)
             arrays = arrays | {"bent": bent, "x": arrays["x"][:, :size], "lam_x": arrays["lam_x"][:, :size]}
         outputs = self._finish(**arrays)
-        if elastic is not None:
-            outputs["slack"] += depth
+        if "opened" in arrays:
+            outputs["slack"] += np.maximum.reduceat(np.abs(arrays["opened"]), [span.start for span in self._qp.spans], axis=1)
         usable = np.isfinite(outputs["corrected"]).all(axis=1)
         residual = outputs["residual"]
         residual[~(usable & np.isfinite(residual[:, 0]))] = np.inf

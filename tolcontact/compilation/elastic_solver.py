@@ -9,9 +9,8 @@ from tolcontact.compilation.dual_kernel import INFEASIBLE, SOLVED, solve_dual
 from tolcontact.compilation.solver import ACCURACY, Arrays
 
 TOLERANCE = 1e-11  # mm: rows that penetrate less are not active
-BALANCED = 1e-10  # of the sum of its terms: what a ray may leave of forces and openings, by rounding
 
-Systems = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # H, g, A, b of solve_dual
+Systems = tuple[np.ndarray, ...]  # H, g, A, b of solve_dual
 
 
 class ElasticSolver:
@@ -19,7 +18,8 @@ class ElasticSolver:
 
     Its rows are in another order: first those that push, last the equations. Slacks of rigid pairs are zero. A QP is solved with
     slacks if a ray proves that its rows contradict each other: reactions that balance each other and bend nothing, while the
-    rows under these reactions penetrate in total. Then `depth` (realization, pair) [mm] is the penetration that is left.
+    rows under these reactions penetrate in total. Then `opened` (realization, row) [mm] is the penetration that is left, with
+    one slack for each pair that pushes, and two for each two-sided locator, by which it opens either way.
     """
 
     remembers = False
@@ -43,11 +43,12 @@ class ElasticSolver:
         self._places = position[self._a[0][self._slopes]] * self._movers + self._a[1][self._slopes]
         of_row = np.repeat(np.arange(pairs), [row_count(points) for points in qp.standing])
         pushing = np.flatnonzero(~holds)
-        self._pairs = np.unique(of_row[pushing])
-        self._opens = np.equal.outer(of_row[pushing], self._pairs) * SLACK  # of these rows by slacks of these pairs
-        self._pair_count = pairs
-        self._is_rigid = np.zeros(size, dtype=bool)
-        self._is_rigid[self._a[1][~self._slopes]] = True
+        self._pairs, either_way = np.unique(of_row[pushing]), np.eye(rows)[:, np.flatnonzero(holds[:count])]
+        by_pair = np.zeros((rows, len(self._pairs)))
+        by_pair[pushing] = np.equal.outer(of_row[pushing], self._pairs)
+        self._opens = SLACK * np.hstack([by_pair, either_way, -either_way])[self._order]
+        self._rigid_slacks = np.unique(self._a[1][~self._slopes])  # variables of the QP
+        self._rigid_rows = np.isin(of_row, self._rigid_slacks - self._movers)
 
     def twin(self) -> "ElasticSolver":
         """Return the solver itself."""
@@ -56,7 +57,7 @@ class ElasticSolver:
     def __call__(
         self, problem: Arrays, reactions: Float[Array, "realization row"], slacks: Float[Array, "realization slack"]
     ) -> tuple[dict[str, Float[Array, "realization _"]], Bool[Array, " realization"]]:
-        """Return x, lam_a, lam_x and `depth` of assembled QPs, (realization, entry), and whether none was found (realization,).
+        """Return x, lam_a, lam_x and `opened` of assembled QPs, (realization, entry), and whether none was found (realization,).
 
         Probably, rows with `reactions` are active.
         """
@@ -65,21 +66,24 @@ class ElasticSolver:
         guess = np.zeros((count, len(self._order)))
         guess[:, : self._count] = reactions
         x, forces, status = _solved(systems, self._C, self._equations, guess[:, self._order])
-        values = np.zeros((count, self._movers + self._pair_count))
+        values, opened = np.zeros((count, problem["g"].shape[1])), np.zeros((count, self._count))
         values[:, : self._movers] = x
-        depth = np.zeros((count, self._pair_count))
-        for k in np.flatnonzero(status == INFEASIBLE):
+        is_huge = np.abs(forces).max(axis=1, initial=0) > self._elastic.length / SLACK  # more than the price of slacks
+        for k in np.flatnonzero((status == INFEASIBLE) | is_huge):
             system = tuple(array[k] for array in systems)
-            if self._is_ray(system, forces[k]):
-                values[k], forces[k], status[k] = self._nearest(system)
-        depth[:, self._pairs] = SLACK * values[:, self._movers + self._pairs]
-        is_rigid = self._is_rigid[self._movers :]
-        depth[:, is_rigid] = 0  # their slacks are variables of the QP
-        values[:, self._movers :][:, ~is_rigid] = 0
+            if status[k] == SOLVED and self._misfit(system, x[k], forces[k]) < ACCURACY:
+                continue
+            increments, slacks_there, reactions_there, outcome = self._nearest(system)
+            if self._is_ray(system, forces[k], reactions_there):
+                forces[k], status[k] = reactions_there, outcome
+                values[k, : self._movers], values[k, self._movers + self._pairs] = increments, slacks_there[: len(self._pairs)]
+                opened[k] = (self._opens @ slacks_there)[np.argsort(self._order)][: self._count]
+        values[:, np.setdiff1d(np.arange(self._movers, values.shape[1]), self._rigid_slacks)] = 0
+        opened[:, self._rigid_rows] = 0
         lam_a = np.empty((count, len(self._order)))
         lam_a[:, self._order] = -forces
         lam_a *= length
-        answer = {"x": values, "lam_a": lam_a, "lam_x": self._lam_x(problem, values, lam_a), "depth": depth}
+        answer = {"x": values, "lam_a": lam_a, "lam_x": self._lam_x(problem, values, lam_a), "opened": opened}
         return answer, status != SOLVED
 
     def _length(self, problem: Arrays) -> np.ndarray:
@@ -104,40 +108,48 @@ class ElasticSolver:
     def _lam_x(self, problem: Arrays, x: np.ndarray, lam_a: np.ndarray) -> np.ndarray:
         """Return the multipliers of the slacks of rigid pairs, by which the slacks are stationary."""
         lam_x = np.zeros(x.shape)
-        if self._is_rigid.any():
-            lam_x[:, self._is_rigid] = -(problem["g"] + x)[:, self._is_rigid]
+        if self._rigid_slacks.size:
+            lam_x[:, self._rigid_slacks] = -(problem["g"] + x)[:, self._rigid_slacks]
             for entry in np.flatnonzero(~self._slopes):
                 row, column = self._a[:, entry]
                 lam_x[:, column] -= problem["a"][:, entry] * lam_a[:, row]
         return lam_x
 
-    def _is_ray(self, system: tuple[np.ndarray, ...], ray: Float[Array, " row"]) -> bool:
-        """Return whether reactions prove that no increment and no other reactions open all rows."""
+    def _misfit(self, system: tuple[np.ndarray, ...], x: Float[Array, " n"], forces: Float[Array, " row"]) -> float:
+        """Return how far [mm] rows under load are from closed, and others inside."""
         _, _, A, b = system
-        own = np.sqrt(np.diag(self._C))
-        balance, bending = np.abs(A.T @ ray), np.abs(self._C @ ray)
-        is_balanced = (balance <= BALANCED * (np.abs(A).T @ np.abs(ray))).all()
-        bends_nothing = (bending <= BALANCED * own * (own @ np.abs(ray))).all()
-        return bool(is_balanced and bends_nothing and b @ ray < -ACCURACY * np.abs(ray).sum())
+        gaps, first = A @ x + self._C @ forces + b, len(b) - self._equations
+        gaps[:first] = np.where(forces[:first] > 0, gaps[:first], np.minimum(gaps[:first], 0))
+        return float(np.abs(gaps).max(initial=0))
 
-    def _nearest(self, system: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray, int]:
-        """Return x with slacks, reactions and the status of a QP whose rows a slack for each pair opens, with a price."""
+    def _is_ray(self, system: tuple[np.ndarray, ...], ray: Float[Array, " row"], limits: Float[Array, " row"]) -> bool:
+        """Return whether a ray proves that nothing opens all rows: no increments up to the length, no reactions up to `limits`.
+
+        The work of the ray on the gaps A x + C l + b would not be negative if they were open.
+        """
+        _, _, A, b = system
+        rounding = np.abs(A.T @ ray).sum() * self._elastic.length + np.abs(self._C @ ray) @ np.abs(limits)
+        return bool(b @ ray + rounding < -ACCURACY * np.abs(ray).sum())
+
+    def _nearest(self, system: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+        """Return increments, slacks, reactions and the status of a QP whose rows open by slacks, which have a price."""
         H, g, A, b = system
-        size, pairs, first = self._movers, len(self._pairs), len(b) - self._equations
-        rows = np.r_[:first, first + pairs : len(b) + pairs]
-        wide_H = np.eye(size + pairs)
-        wide_H[:size, :size] = H
-        wide_A, wide_C = np.zeros((len(b) + pairs, size + pairs)), np.zeros((len(b) + pairs,) * 2)
-        wide_A[rows, :size], wide_C[np.ix_(rows, rows)] = A, self._C
-        wide_A[:first, size:], wide_A[first : first + pairs, size:] = self._opens, np.eye(pairs)
-        wide_b = np.zeros(len(b) + pairs)
-        wide_b[rows] = b
-        price = np.full(pairs, self._elastic.length)
-        wide = wide_H[None], np.concatenate([g, price])[None], wide_A[None], wide_b[None]
-        x, forces, status = _solved(wide, wide_C, self._equations, np.zeros((1, len(wide_b))))
-        values = np.zeros(size + self._pair_count)
-        values[:size], values[size + self._pairs] = x[0, :size], np.maximum(x[0, size:], 0)
-        return values, forces[0, rows], int(status[0])
+        (rows, size), slacks, first = A.shape, self._opens.shape[1], len(b) - self._equations
+        at = np.r_[:first, first + slacks : rows + slacks]  # bounds of the slacks come between
+        wide_H, wide_A, wide_C = np.eye(size + slacks), np.zeros((rows + slacks, size + slacks)), np.zeros((rows + slacks,) * 2)
+        wide_H[:size, :size], wide_C[np.ix_(at, at)] = H, self._C
+        wide_A[at, :size], wide_A[at, size:] = A, self._opens
+        wide_A[first : first + slacks, size:] = np.eye(slacks)
+        wide_b = np.zeros(rows + slacks)
+        wide_b[at] = b
+        wide = wide_H, np.concatenate([g, np.full(slacks, self._elastic.length)]), wide_A, wide_b
+        x, forces, status = _solved(tuple(array[None] for array in wide), wide_C, self._equations, np.zeros((1, len(wide_b))))
+        increments, opening, reactions = x[0, :size], np.maximum(x[0, size:], 0), forces[0, at]
+        # Large reactions leave rounding in the increments: they close the rows under load again.
+        closed = (reactions != 0) | (np.arange(rows) >= first)
+        gaps = A @ increments + self._C @ reactions + b + self._opens @ opening
+        increments = increments - np.linalg.lstsq(A[closed], gaps[closed])[0]
+        return increments, opening, reactions, int(status[0])
 
 
 def _solved(systems: Systems, C: np.ndarray, equations: int, guess: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -169,6 +169,7 @@ class ContactResolver:
                 misfit = spring_misfit(pair, gaps, reactions)
             else:
                 gaps += openings[:, span]
+                gaps = -np.abs(gaps) if pair.holds else gaps  # it has no gap, either way
                 state.gap_min[:, k] = gaps.min(axis=1)
                 misfit = elastic_misfit(pair, gaps, reactions * np.diag(flexibility.C)[span])
             depth[:, k] = misfit - state.slack[:, k]
