@@ -42,7 +42,7 @@ def solve_dual(H, g, A, b, C, equations, guess, tolerance, x, reactions, status)
     tolerance   [mm]: a row penetrates if its gap is below -tolerance
     """
     count, rows, size = A.shape
-    B, L, q, v = np.empty((size, rows)), np.empty((size, size)), np.empty(rows), np.empty(size)
+    B, L, q, v, u = np.empty((size, rows)), np.empty((size, size)), np.empty(rows), np.empty(size), np.empty(size)
     gaps, factor, y = np.empty(rows), np.empty((rows, rows)), np.empty(rows)
     active, is_active, best = np.empty(rows, np.int64), np.empty(rows, np.bool_), np.empty(rows, np.bool_)
     first = rows - equations
@@ -50,9 +50,9 @@ def solve_dual(H, g, A, b, C, equations, guess, tolerance, x, reactions, status)
         _reduce(H[k], g[k], A[k], b[k], L, v, B, q)
         for i in range(rows):
             is_active[i] = i >= first or guess[k, i] > 0
-        work = (B, C, q, gaps, reactions[k], factor, y, active, is_active, first, tolerance)
+        work = (B, C, q, gaps, reactions[k], factor, y, active, is_active, first, tolerance, b[k], v, u)
         status[k] = SOLVED if _exchange(work, best) else _dual_steps(work)
-        _mover_motion(L, v, B, reactions[k], x[k])
+        _mover_motion(L, u, x[k])
 
 
 @inner
@@ -83,13 +83,11 @@ def _reduce(H, g, A, b, L, v, B, q):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _mover_motion(L, v, B, reactions, x):  # type: ignore[no-untyped-def]
-    """Write x = L^-T (B l - v)."""
-    size = len(v)
+def _mover_motion(L, u, x):  # type: ignore[no-untyped-def]
+    """Write x = L^-T u."""
+    size = len(u)
     for c in range(size):
-        x[c] = -v[c]
-        for row in range(len(reactions)):
-            x[c] += B[c, row] * reactions[row]
+        x[c] = u[c]
     for i in range(size - 1, -1, -1):
         for j in range(i + 1, size):
             x[i] -= L[j, i] * x[j]
@@ -97,42 +95,70 @@ def _mover_motion(L, v, B, reactions, x):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _solve_active(work, k, start):  # type: ignore[no-untyped-def]
-    """Write the reactions of k active rows for which their gaps are 0. If `start` is not 0, refine those that are there."""
-    q, gaps, reactions, factor, y, active = work[2], work[3], work[4], work[5], work[6], work[7]
-    if start == 0:
-        for i in range(len(q)):
-            reactions[i] = 0.0
-            gaps[i] = q[i]
+def _solve_active(work, k):  # type: ignore[no-untyped-def]
+    """Write the reactions of k active rows for which their gaps are 0, and all gaps; return what rounding makes of the tolerance."""
+    q, reactions, factor, y, active = work[2], work[4], work[5], work[6], work[7]
+    for i in range(len(q)):
+        reactions[i] = 0.0
     for j in range(k):
-        y[j] = -gaps[active[j]]
+        y[j] = -q[active[j]]
     forward_substitute(factor, k, y)
     back_substitute(factor, k, y)
     for j in range(k):
-        reactions[active[j]] += y[j]
+        reactions[active[j]] = y[j]
     return _write_gaps(work, k)
 
 
 @inner
-def _write_gaps(work, k):  # type: ignore[no-untyped-def]
-    """Write the gaps q + W l of all rows for k active ones, and return the tolerance, or what rounding makes of it."""
-    B, C, q, gaps, reactions, active = work[0], work[1], work[2], work[3], work[4], work[7]
-    for i in range(len(q)):
-        gaps[i] = q[i]
+def _refine(work, k):  # type: ignore[no-untyped-def]
+    """Close what rounding has left of the gaps of k active rows, and return the tolerance.
+
+    Reactions that balance large forces leave rounding in u, which the gaps contain. So u and the reactions change together.
+    """
+    B, C, gaps, reactions, factor, y, active, u = work[0], work[1], work[3], work[4], work[5], work[6], work[7], work[13]
     for j in range(k):
-        value, column = reactions[active[j]], C[active[j]]
-        for i in range(len(q)):
-            gaps[i] += value * column[i]
-    for c in range(len(B)):
-        total = 0.0
-        for j in range(k):
-            total += B[c, active[j]] * reactions[active[j]]
-        for i in range(len(q)):
-            gaps[i] += B[c, i] * total
+        y[j] = -gaps[active[j]]
+    forward_substitute(factor, k, y)
+    back_substitute(factor, k, y)
     terms = 0.0
     for j in range(k):
-        terms += abs(reactions[active[j]]) * flexibility_between(B, C, active[j], active[j])
+        row = active[j]
+        reactions[row] += y[j]
+        terms += abs(reactions[row]) * C[row, row]
+        for c in range(len(B)):
+            u[c] += B[c, row] * y[j]
+    _write_gaps_of(work, k)
     return max(work[10], 4.0 * ROUNDING * terms)
+
+
+@inner
+def _write_gaps(work, k):  # type: ignore[no-untyped-def]
+    """Write u = B l - v and the gaps of all rows for k active ones, and return the tolerance, or what rounding makes of it."""
+    B, C, reactions, active, v, u = work[0], work[1], work[4], work[7], work[12], work[13]
+    terms = 0.0
+    for c in range(len(B)):
+        u[c] = -v[c]
+        for j in range(k):
+            u[c] += B[c, active[j]] * reactions[active[j]]
+    for j in range(k):
+        terms += abs(reactions[active[j]]) * flexibility_between(B, C, active[j], active[j])
+    _write_gaps_of(work, k)
+    return max(work[10], 4.0 * ROUNDING * terms)
+
+
+@inner
+def _write_gaps_of(work, k):  # type: ignore[no-untyped-def]
+    """Write the gaps B'u + C l + b of all rows for k active ones."""
+    B, C, gaps, reactions, active, b, u = work[0], work[1], work[3], work[4], work[7], work[11], work[13]
+    for i in range(len(b)):
+        gaps[i] = b[i]
+    for j in range(k):
+        value, column = reactions[active[j]], C[active[j]]
+        for i in range(len(b)):
+            gaps[i] += value * column[i]
+    for c in range(len(B)):
+        for i in range(len(b)):
+            gaps[i] += B[c, i] * u[c]
 
 
 @inner
@@ -143,10 +169,10 @@ def _exchange(work, best):  # type: ignore[no-untyped-def]
     fewest, patience = rows + 1, PATIENCE
     for _ in range(MAX_ROUNDS):
         k = _extended(work, kept)
-        tolerance = _solve_active(work, k, 0)
+        tolerance = _solve_active(work, k)
         wrong = _wrong_rows(work, tolerance)
         if wrong == 0:
-            tolerance = _solve_active(work, k, 1)
+            tolerance = _refine(work, k)
             wrong = _wrong_rows(work, tolerance)
         if wrong == 0:
             return True
@@ -229,7 +255,7 @@ def _feasible_start(work):  # type: ignore[no-untyped-def]
     is_active[first:] = True
     k = _extended(work, 0)
     while True:
-        _solve_active(work, k, 0)
+        _solve_active(work, k)
         worst = -1
         for j in range(k):
             row = active[j]
@@ -265,8 +291,8 @@ def _dual_steps(work):  # type: ignore[no-untyped-def]
             return INFEASIBLE
         k = left
         is_active[new] = True
-        _solve_active(work, k, 0)
-        tolerance = _solve_active(work, k, 1)
+        _solve_active(work, k)
+        tolerance = _refine(work, k)
         for j in range(k):  # of rounding
             if active[j] < first and reactions[active[j]] < 0:
                 reactions[active[j]] = 0.0
