@@ -137,9 +137,10 @@ def _write_gaps(work, k):  # type: ignore[no-untyped-def]
     B, C, reactions, active, v, u = work[0], work[1], work[4], work[7], work[12], work[13]
     terms = 0.0
     for c in range(len(B)):
-        u[c] = -v[c]
+        total = -v[c]
         for j in range(k):
-            u[c] += B[c, active[j]] * reactions[active[j]]
+            total += B[c, active[j]] * reactions[active[j]]
+        u[c] = total
     for j in range(k):
         terms += abs(reactions[active[j]]) * flexibility_between(B, C, active[j], active[j])
     _write_gaps_of(work, k)
@@ -157,8 +158,9 @@ def _write_gaps_of(work, k):  # type: ignore[no-untyped-def]
         for i in range(len(b)):
             gaps[i] += value * column[i]
     for c in range(len(B)):
+        value = u[c]
         for i in range(len(b)):
-            gaps[i] += B[c, i] * u[c]
+            gaps[i] += B[c, i] * value
 
 
 @inner
