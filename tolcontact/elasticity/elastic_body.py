@@ -53,6 +53,8 @@ class ElasticBody:
         None is twice the volume by the surface area, the thickness of a sheet. On an imported matrix it acts on the node at its
         point. Raises GeometryFault if there is no such node or surface.
         """
+        if not len(points):  # of a part where nothing is measured
+            return sparse.csc_array((self.nodes.size, 0))
         return self.pads(points, directions, radius)
 
     def weight(self, acceleration: Float[Array, " 3"]) -> Float[Array, " force"]:
