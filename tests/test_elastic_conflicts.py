@@ -66,7 +66,9 @@ def test_locators_close_to_each_other_are_no_conflict(tmp_path):
 def names_in_conflict(program, run):
     """The pairs that keep a gap, or penetrate, in each realization that is not assemblable: a set of sets."""
     stuck = run["gap_min"][run["status"] == Status.NOT_ASSEMBLABLE, CORRECTED] < -1e-6
-    return {frozenset(pair.name for pair, is_stuck in zip(program.nominal.pairs, row, strict=True) if is_stuck) for row in stuck}
+    return {
+        frozenset(pair.name for pair, is_stuck in zip(program.nominal.pairs, row, strict=True) if is_stuck) for row in stuck
+    }
 
 
 @pytest.mark.parametrize("solver", ["qpoases", "graph", *nightly("daqp", "osqp", "piqp")])

@@ -103,7 +103,9 @@ def test_random_flexibilities_have_the_answers_of_plugins(rows, plugin):
     L = np.linalg.cholesky(C)
     wide = ca.Sparsity.dense(rows, 6 + rows)
     options = {"daqp": {"primal_tol": 1e-13, "dual_tol": 1e-13, "zero_tol": 1e-15}}
-    conic = ca.conic("qp", plugin, {"h": ca.Sparsity.dense(6 + rows, 6 + rows), "a": wide}, options if plugin == "daqp" else QPOASES)
+    conic = ca.conic(
+        "qp", plugin, {"h": ca.Sparsity.dense(6 + rows, 6 + rows), "a": wide}, options if plugin == "daqp" else QPOASES
+    )
     for k in range(4):
         whole = np.eye(6 + rows)
         whole[:6, :6] = H[k]
