@@ -126,6 +126,12 @@ def test_an_archive_of_welded_sheets_is_recomputed_and_resumed_to_the_same_bits(
     tc.run(model, samples=8, seed=2, out=parts)
     tc.run(model, samples=24, seed=2, out=parts, resume=True)
     assert_same_run(whole, parts)
+    with tc.open_archive(whole) as tree, tc.open_archive(parts) as resumed:
+        field, again = (results["field/rear"].to_dataset() for results in (tree, resumed))
+        assert again.six_sigma.values == pytest.approx(field.six_sigma.values, abs=1e-12)
+        corner = np.abs(field.vertices.values - (550, 200, 1)).sum(axis=1).argmin()
+        spread = field.six_sigma.sel(state="corrected", component="z").values[corner]
+        assert spread == pytest.approx(6 * tree.measured.values[:, CORRECTED, 3].std(ddof=1), abs=1e-6)
 
 
 def test_blocks_and_threads_change_no_bit(tmp_path):

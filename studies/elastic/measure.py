@@ -149,8 +149,8 @@ def main() -> None:
     parser.add_argument("--to", type=Path, default=HERE, help="folder of the page")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore", NominalWarning)
-    tables: dict[str, Table] = {"accuracy": accuracy(), "refusal": [["message"], [refusal()]]}
-    tables["cost"] = cost(arguments.rows, arguments.realizations)
+    costs = cost(arguments.rows, arguments.realizations)  # first, in a process that has done nothing else
+    tables: dict[str, Table] = {"accuracy": accuracy(), "refusal": [["message"], [refusal()]], "cost": costs}
     write(__file__, tables, arguments.to)
 
 

@@ -187,7 +187,7 @@ class ContactSolver:
         return np.split(rows, range(self._max_dense, len(rows), self._max_dense)) if rows.size else []
 
     def _dense_problem(self, problem: Arrays, rows: np.ndarray) -> dict[str, np.ndarray]:
-        whole = self._qp.whole(_of(problem, rows))
+        whole = self._qp.whole({name: problem[name][rows] for name in ("h", "g", "a", "lba", "length")})
         return {name: self._dense(name, whole[name]) for name in ("h", "g", "a", "lba")}
 
     def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:

@@ -43,7 +43,8 @@ class ElasticColumns:
             return ca.vertcat(sparsity, ca.Sparsity.dense(count, 1))
         if name == "a":
             rows, columns, _ = self._entries
-            return ca.horzcat(sparsity, ca.Sparsity.triplet(sparsity.size1(), count, rows.tolist(), columns.tolist()))
+            starts = np.searchsorted(columns, np.arange(count + 1))
+            return ca.horzcat(sparsity, ca.Sparsity(sparsity.size1(), count, starts.tolist(), rows.tolist()))
         return sparsity
 
     def joined(self, problem: Mapping[str, Float[Array, "realization _"]]) -> dict[str, Float[Array, "realization _"]]:

@@ -32,7 +32,8 @@ class Solver(Protocol):
     ) -> tuple[dict[str, Float[Array, "realization _"]], Bool[Array, " realization"]]:
         """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver failed.
 
-        Probably, rows with `reactions` are active, and `slacks` above zero are open.
+        Probably, rows with `reactions` are active, and `slacks` above zero are open. A solver of elastic parts also returns
+        `opened` (realization, row) [mm]: the penetration that it left to rows which contradict each other.
         """
         ...
 
