@@ -182,7 +182,7 @@ def contact_qp(
         has_springs=group.has_springs,
         equations=exact.numel(),
         standing=standing,
-        elastic=None if flexibility is None else ElasticColumns(flexibility, float(terms.scale), group.length),
+        elastic=None if flexibility is None else ElasticColumns(flexibility, float(terms.scale), float(group.length)),
     )
 
 

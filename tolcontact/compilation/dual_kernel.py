@@ -96,7 +96,7 @@ def _mover_motion(L, u, x):  # type: ignore[no-untyped-def]
 
 @inner
 def _solve_active(work, k):  # type: ignore[no-untyped-def]
-    """Write the reactions of k active rows for which their gaps are 0, and all gaps; return what rounding makes of the tolerance."""
+    """Write the reactions that close k active rows, and all gaps; return the tolerance, or what rounding makes of it."""
     q, reactions, factor, y, active = work[2], work[4], work[5], work[6], work[7]
     for i in range(len(q)):
         reactions[i] = 0.0
@@ -303,7 +303,7 @@ def _dual_steps(work):  # type: ignore[no-untyped-def]
 
 @inner
 def _activate(work, k, new):  # type: ignore[no-untyped-def]
-    """Raise the reaction of a `new` row until its gap is 0, and return the number of active rows, negative if that is impossible.
+    """Raise the reaction of a `new` row until its gap is 0; return the number of active rows, negated if that is impossible.
 
     Along the way, the gaps of active rows stay 0: their reactions change by -W_aa^-1 W_an for each unit of the new one.
     """

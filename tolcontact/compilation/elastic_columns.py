@@ -1,7 +1,7 @@
 """The columns of a contact QP by which elastic parts bend: slacks s without bounds, which open many rows.
 
-With L L' = C they open the rows by L s and cost s's/2, so that s = L'l for the reactions l, and the gaps open by C l. C is the same
-in all realizations. So `assemble` leaves these columns out: `finish` judges answers by C l, and solvers that need columns get L.
+With L L' = C they open the rows by L s and cost s's/2, so that s = L'l for the reactions l, and the gaps open by C l.
+C is the same in all realizations. So `assemble` leaves these columns out, `finish` judges answers by C l, and plugins get L.
 """
 
 from collections.abc import Mapping

@@ -16,10 +16,10 @@ Systems = tuple[np.ndarray, ...]  # H, g, A, b of solve_dual
 class ElasticSolver:
     """A solver of the QPs of a group with elastic parts. It has no memory, so threads may share it.
 
-    Its rows are in another order: first those that push, last the equations. Slacks of rigid pairs are zero. A QP is solved with
-    slacks if a ray proves that its rows contradict each other: reactions that balance each other and bend nothing, while the
-    rows under these reactions penetrate in total. Then `opened` (realization, row) [mm] is the penetration that is left, with
-    one slack for each pair that pushes, and two for each two-sided locator, by which it opens either way.
+    Its rows are in another order: contact first, equations last. Slacks of rigid pairs are zero. A QP is solved with slacks if
+    a ray proves that its rows contradict each other: reactions that balance each other and bend nothing, while the rows under
+    these reactions penetrate in total. Then `opened` (realization, row) [mm] is the penetration that is left, by one slack for
+    each pair in contact, and two for each two-sided locator, which opens either way.
     """
 
     remembers = False
@@ -57,7 +57,7 @@ class ElasticSolver:
     def __call__(
         self, problem: Arrays, reactions: Float[Array, "realization row"], slacks: Float[Array, "realization slack"]
     ) -> tuple[dict[str, Float[Array, "realization _"]], Bool[Array, " realization"]]:
-        """Return x, lam_a, lam_x and `opened` of assembled QPs, (realization, entry), and whether none was found (realization,).
+        """Return x, lam_a, lam_x and `opened` of assembled QPs, (realization, entry), and which have no answer (realization,).
 
         Probably, rows with `reactions` are active.
         """

@@ -69,7 +69,7 @@ class Flexibility:
         return openings
 
     def bent(self, reactions: Float[Array, "realization row"]) -> Float[Array, "realization row"]:
-        """Return C l (realization, row) [mm]: the openings under reactions [N] of the rows, without those by constant forces."""
+        """Return C l (realization, row) [mm]: the openings by reactions [N] of the rows, without constant forces."""
         openings = np.zeros(reactions.shape)
         add_openings(self.C, np.ascontiguousarray(reactions), openings)
         return openings

@@ -1,9 +1,9 @@
 """Displacement fields (14): u = (R - I) v + t at surface points v, over all realizations.
 
 u is linear in the 12 pose entries, so mean and spread of its components follow exactly from the mean and covariance of the
-poses. Elastic parts are bent in the corrected state, which adds the displacements by their loads: u is linear in these, too. Its magnitude is not linear: its moments are accumulated point by point, over the first realizations only. That is enough
-for a colour map, and the interval states the uncertainty. The worker that simulates a block also computes its sums; the sums of
-all blocks are merged in order.
+poses. In the corrected state, elastic parts are bent by their loads, in which u is linear, too. Its magnitude is not linear:
+its moments are accumulated point by point, over the first realizations only. That is enough for a colour map, and the interval
+states the uncertainty. The worker that simulates a block also computes its sums; the sums of all blocks are merged in order.
 """
 
 import sys

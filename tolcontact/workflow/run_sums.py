@@ -86,7 +86,10 @@ class _BlockReduction(ProgramFunction):
         # Reprojected contact points differ from the points of the model.
         rows = np.flatnonzero(block.searched[: max(self.counted - block.start, 0)] == 0)
         counts = count_touching(program, block.poses[rows, CORRECTED], block.deviations[rows])
-        return row_values(block, self.kept, program.nominal), (self.fields.sums(block.poses, block.start, block.status, block.load), counts)
+        return row_values(block, self.kept, program.nominal), (
+            self.fields.sums(block.poses, block.start, block.status, block.load),
+            counts,
+        )
 
 
 class RunSums:

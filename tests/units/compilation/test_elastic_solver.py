@@ -83,10 +83,9 @@ def test_poses_and_reactions_are_those_of_plugins(tmp_path, scene, plugin):
     """
     for qp, answers in steps(SCENES[scene](tmp_path), 6):
         plain = ContactSolver(qp, replace(SOLVERS[plugin], fallbacks=(), remembers=False))
-        plain._kernel = None  # nothing but the plugin
         for arrays, answer in answers:
             expected = plain(**arrays)
-            assert expected["residual"].max() < ACCURACY
+            assert expected["residual"].max() < ACCURACY and not expected["second"].any()  # by nothing but the plugin
             assert expected["corrected"] == pytest.approx(answer["corrected"], abs=1e-9)
             reactions, others = answer["multipliers"], expected["multipliers"]
             assert qp.flexibility.bent(others) == pytest.approx(qp.flexibility.bent(reactions), abs=1e-9)

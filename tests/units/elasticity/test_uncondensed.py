@@ -8,7 +8,6 @@ from scipy.sparse.linalg import splu
 from studies.elastic.measure import cover
 from tests.helpers import compiled, nightly
 from tolcontact.elasticity import MeshSource, elastic_body
-from tolcontact.elasticity.meshed_body import _mesh, element_size
 from tolcontact.elasticity.tetrahedra import stiffness_of
 from tolcontact.poses import AT_REST
 from tolcontact.simulation import simulate_block
@@ -30,8 +29,7 @@ class WholePlate:
             np.ascontiguousarray(self.part.mesh.faces, dtype=np.int64),
         )
         self.body = elastic_body(MeshSource(vertices, faces, *MATERIAL))
-        size = element_size(vertices, faces, float(self.part.mesh.area), None)
-        self.K = stiffness_of(_mesh(vertices, faces, None, size), *MATERIAL).tocsc()
+        self.K = stiffness_of(self.body.pads.mesh, *MATERIAL).tocsc()
         points = [(self.nominal.pairs[pair], point) for pair, point in self.nominal.loads]
         self.N = self.spread([pair.P_m[point] for pair, point in points], [pair.n_r[point] for pair, point in points])
         self.holds = np.array([pair.holds for pair, _ in points])
