@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases import elastic as cases
 from tests.helpers import compiled, nightly, simulate
 from tests.test_elastic_parts import tips
 from tolcontact.errors import ModelError, NominalWarning
+from tolcontact.testing import assert_gaps_recompute
 from tolcontact.vocabulary import CERTIFIED, CORRECTED, Status
 
 FEET = [(x, y, 0.0) for x in (10.0, 200.0, 390.0) for y in (0.0, 20.0)]
@@ -18,19 +20,20 @@ SIDES = [((10, 0, 0), "y"), ((390, 0, 0), "y"), ((10, 20, 0), "x")]
 ABOVE = (200, 10, 10)
 
 
-def beam(folder, feet=range(6), *others, one_sided=False, press=-100.0):
+def beam(folder, feet=range(6), *others, one_sided=False, press=-100.0, turned=False):
     """A beam on some of six feet, soft in bending, with further locators (place, direction[, one-sided])."""
     nodes = np.array([*FEET, ABOVE], dtype=float)
     middle = [(1 / 3, 200, y) for y in (0, 10, 20)]
     bend = cases.lifts(nodes, *middle, *((-0.25, x, y) for x in (10, 390) for y in (0, 20)))
     model = tc.Assembly("beam", method=tc.Method(objective="seating"))
-    part = model.part("beam", tc.Box(400, 20, 10))
+    R, place = ((0.3, -1.1, 2.0), (500, -80, 33)) if turned else ((0, 0, 0), (0, 0, 0))
+    part = model.part("beam", tc.Box(400, 20, 10), rotation=R, at=place)
     part.elastic(**cases.saved(folder, "beam", nodes, cases.stiffness(nodes, bend, [300.0], stiff=9000.0)))
     places = [*((FEET[k], "z", one_sided) for k in feet), *(others or SIDES)]
     scheme = [tc.Locator(f"L{k}", point, *n[:1], one_sided=any(n[1:])) for k, (point, *n) in enumerate(places)]
     model.locate(part, scheme, tolerance=0.6)
-    model.force("press", at=part.point(*ABOVE), vector=(0, 0, press))
-    model.measure("middle", part.point(200, 0, 0), along="z", tolerance=1)
+    model.force("press", at=part.point(*ABOVE), vector=Rotation.from_rotvec(R).apply((0, 0, press)))
+    model.measure("middle", part.point(200, 0, 0), along=Rotation.from_rotvec(R).apply((0, 0, 1)), tolerance=1)
     return model
 
 
@@ -60,18 +63,41 @@ def test_locators_close_to_each_other_are_no_conflict(tmp_path):
     assert (run["status"] == Status.RESOLVED).all()
 
 
-@pytest.mark.parametrize("solver", ["qpoases", *nightly("daqp", "osqp", "piqp")])
+def names_in_conflict(program, run):
+    """The pairs that keep a gap, or penetrate, in each realization that is not assemblable: a set of sets."""
+    stuck = run["gap_min"][run["status"] == Status.NOT_ASSEMBLABLE, CORRECTED] < -1e-6
+    return {
+        frozenset(pair.name for pair, is_stuck in zip(program.nominal.pairs, row, strict=True) if is_stuck) for row in stuck
+    }
+
+
+@pytest.mark.parametrize("solver", ["qpoases", "graph", *nightly("daqp", "osqp", "piqp")])
 @pytest.mark.parametrize("one_sided", [False, True])
-def test_a_stop_that_cannot_be_passed_is_never_certified(tmp_path, solver, one_sided):
+def test_a_stop_that_cannot_be_passed_is_not_assemblable_and_named(tmp_path, solver, one_sided):
     """A foot and a stop hold the same node from both sides: no pose where the stop is lower than the foot, by any bending."""
     model = beam(tmp_path, range(6), *SIDES, ((200, 0, 0), "-z", True), one_sided=one_sided)
     program, run = simulate(model, samples=24, solver=solver)
     foot, stop = (run["deviations"][:, program.nominal.contributors.index(f"beam.{name}")] for name in ("L2", "L9"))
     overlaps = foot + stop > 0
     assert 0 < overlaps.sum() < 24
-    certified = np.isin(run["status"], CERTIFIED)
-    assert (certified == ~overlaps).all()
-    assert (run["gap_min"][overlaps, CORRECTED].min(axis=1) < -1e-6).all()
+    assert np.isin(run["status"][~overlaps], CERTIFIED).all()
+    assert (run["status"][overlaps] == Status.NOT_ASSEMBLABLE).all()
+    assert names_in_conflict(program, run) == {frozenset(["supports of beam", *(() if one_sided else ("beam.L2",))])}
+    left = -run["gap_min"][overlaps, CORRECTED].min(axis=1)  # both open by half of what they overlap
+    assert left == pytest.approx((foot + stop)[overlaps] / 2, rel=1e-3)
+
+
+def test_conflicts_of_a_beam_do_not_depend_on_its_place_and_are_recomputed(tmp_path):
+    """Turned in space, the same realizations are not assemblable, and an archive tells by how much."""
+    overlaps = []
+    for turned in (False, True):
+        model = beam(tmp_path, range(6), *SIDES, ((200, 0, 0), "-z", True), turned=turned)
+        with tc.run(model, samples=16, seed=3, out=tmp_path / f"{turned}.nc") as results:
+            overlaps.append(np.where(results.status == Status.NOT_ASSEMBLABLE, results.gap_min[:, CORRECTED].min("pair"), 0))
+            counts = tc.summarize(results)["conflicts"].to_series()
+        assert_gaps_recompute(tmp_path / f"{turned}.nc")
+        assert counts["beam.L2"] == counts["supports of beam"] == (overlaps[0] < 0).sum() > 0 == counts["beam.L1"]
+    assert overlaps[1] == pytest.approx(overlaps[0], abs=1e-5)
 
 
 @pytest.mark.parametrize("feet", [range(6), (2, 3, 4, 5)])
@@ -110,14 +136,15 @@ def test_gravity_of_a_part_whose_mass_is_unknown_names_the_part(tmp_path):
         compiled(model)
 
 
-def test_locators_and_guns_at_both_tips_contradict_each_other_and_are_never_certified(tmp_path):
+def test_locators_and_guns_at_both_tips_contradict_each_other_and_are_named(tmp_path):
     """Guns close the gap between two tips, and a locator holds each of them: their heights differ, whatever bends."""
     model = tips(tmp_path)
     held = [
         replace(location, scheme=(*location.scheme, tc.Locator("D", place, "z", tolerance=0.1)))
         for location, place in zip(model.locations[:2], ((92, 10, 1), (8, 10, 0)), strict=True)
     ]
-    _, run = simulate(model.replaced(locations=[*held, *model.locations[2:]]), samples=6)
-    assert (run["status"] == Status.NOT_CONVERGED).all()
+    program, run = simulate(model.replaced(locations=[*held, *model.locations[2:]]), samples=6)
+    assert (run["status"] == Status.NOT_ASSEMBLABLE).all()
+    assert names_in_conflict(program, run) == {frozenset(["weld.left.D", "weld.right.D", "guns of weld.tips"])}
     _, run = simulate(model.replaced(locations=[held[0], *model.locations[1:]]), samples=6)
     assert (run["status"] == Status.RESOLVED).all()  # a single one bends the other tip

@@ -95,10 +95,8 @@ def test_other_methods_are_refused(tmp_path, choices, fault):
         tc.build(supported_beam(tmp_path, 10.0), method=tc.Method(objective="seating").with_choices(**choices))
 
 
-def test_a_solver_and_analyses_of_rigid_parts_are_refused(tmp_path):
+def test_analyses_of_rigid_parts_are_refused(tmp_path):
     model = supported_beam(tmp_path, 10.0)
-    with pytest.raises(OptionError, match=r'solver "graph" has no elastic parts.*qpoases'):
-        compiled(model, solver="graph")
     for analysis in (tc.analyses.worst_case, tc.analyses.seating):
         with pytest.raises(
             OptionError, match='part "beam" of "supported beam" is elastic, and this analysis is of rigid parts'

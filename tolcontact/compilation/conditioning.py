@@ -33,39 +33,26 @@ def conditioned(
 
     The `misfit` (locator, 1) [mm] of exact two-sided locators gives the last rows, which are equations. A compliant row has its
     own slack without a price, after the slacks of the pairs. With the opening sqrt(C), this slack adds C times the multiplier
-    to the gap. `scale` is the scale of the objective.
+    to the gap. Slacks of elastic parts are left out, see ElasticColumns. `scale` is the scale of the objective.
     """
     pairs, equations = len(system.group.pairs), misfit.numel()
     H, to_z = unit_blocks(Q, call)
     gap_rows = conditioned_rows(rows, to_z, openings(rows.compliance, scale), system.group.length, call)
     B = system.slope(misfit) @ to_z
     owners, priced = slack_owners(rows.pairs, rows.springs, pairs)
+    if rows.flexibility is not None:
+        priced = priced[:pairs]
     opens = ca.sparsify(ca.DM(np.equal.outer(owners, range(len(priced))).astype(float)))
     targets = -system.at_rest(misfit)
     return {
         "h": ca.diagcat(H, ca.SX.eye(len(priced))),
         "g": ca.vertcat(to_z.T @ gradient, ca.DM(priced.astype(float)) * system.group.length),
-        "a": ca.blockcat([[gap_rows.A, slack_openings(rows, gap_rows, opens, scale)], [B, ca.SX(equations, len(priced))]]),
+        "a": ca.blockcat([[gap_rows.A, ca.diag(gap_rows.opening) @ opens], [B, ca.SX(equations, len(priced))]]),
         "lba": ca.vertcat(gap_rows.lower, targets),
         "uba": ca.vertcat(_upper(rows, gap_rows.lower), targets),
         "to_z": to_z,
         "length": gap_rows.length,
     }
-
-
-def slack_openings(rows: Rows, gap_rows: ConditionedRows, opens: ca.DM, scale: ca.SX) -> ca.SX:
-    """Return by how much slacks open the rows, from the slack that each row has alone, `opens` (row, slack).
-
-    The slacks of elastic rows open many rows, by L with L L' = C, and are not bounded: together they add C times the
-    multipliers to the gaps.
-    """
-    opened = ca.diag(gap_rows.opening) @ opens
-    if rows.flexibility is None:
-        return opened
-    bent = rows.flexibility.rows
-    shares = ca.diag(ca.sqrt(scale) / gap_rows.length[bent.tolist()])
-    opened[bent.tolist(), opened.size2() - len(bent) :] = shares @ ca.sparsify(ca.DM(rows.flexibility.factor))
-    return ca.sparsify(opened)
 
 
 def _upper(rows: Rows, lower: ca.SX) -> ca.SX:

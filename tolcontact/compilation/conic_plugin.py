@@ -1,6 +1,7 @@
 """CasADi's conic plugins as solvers of contact QPs."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -49,10 +50,13 @@ class ConicSolver:
 
     def __init__(self, plugin: Plugin, qp: ContactQP) -> None:
         self._plugin, self._qp, self.remembers = plugin, qp, plugin.remembers
+
+    @cached_property
+    def _solve(self) -> tuple[InterpretedFunction, list[str], list[int]]:
+        """The function of the plugin, the names of its inputs, and which of its outputs are results."""
+        plugin, qp = self._plugin, self._qp
         with CONSTRUCTION_LOCK, quiet():
             conic = plugin.function(qp.sparsity("h"), qp.sparsity("a"), springs=qp.has_springs)
-        self._inputs = [name for name in conic.name_in() if name in QP]
-        self._results = [conic.name_out().index(name) for name in SOLUTION]
         lower_bounds = np.zeros(conic.numel_in("g"))
         lower_bounds[: -qp.slacks] = -np.inf
         lower_bounds[len(lower_bounds) - qp.free_slacks :] = -np.inf
@@ -60,7 +64,8 @@ class ConicSolver:
         # The other inputs, initial guesses, are zero: no plugin uses them.
         fixed_inputs = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(conic.name_in()) if name not in QP}
         with CONSTRUCTION_LOCK, quiet():
-            self._solve = InterpretedFunction(conic, fixed_inputs)
+            function = InterpretedFunction(conic, fixed_inputs)
+        return function, [name for name in conic.name_in() if name in QP], [conic.name_out().index(name) for name in SOLUTION]
 
     def __call__(self, problem: Arrays, reactions: np.ndarray, slacks: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the plugin failed.
@@ -68,16 +73,18 @@ class ConicSolver:
         A plugin that starts from the previous problem is faster if similar problems follow each other. So they are sorted by
         their probable active set: rows with `reactions` (realization, row), or in a first step violated rows.
         """
-        inputs = [problem[name] for name in self._inputs]
+        solve, names, results = self._solve
+        whole = self._qp.whole(problem)
+        inputs = [whole[name] for name in names]
         if not self.remembers:
-            solved, failed = self._solve(inputs)
-            return {name: solved[i] for name, i in zip(SOLUTION, self._results, strict=True)}, failed
+            solved, failed = solve(inputs)
+            return {name: solved[i] for name, i in zip(SOLUTION, results, strict=True)}, failed
         violated = problem["lba"][:, : reactions.shape[1]]
         likely = np.where(reactions.any(axis=1, keepdims=True), reactions, violated) > 0
         order = np.lexsort(np.packbits(likely, axis=1).T)
-        solved, failed = self._solve([array[order] for array in inputs])
+        solved, failed = solve([array[order] for array in inputs])
         back = np.argsort(order)
-        return {name: solved[i][back] for name, i in zip(SOLUTION, self._results, strict=True)}, failed[back]
+        return {name: solved[i][back] for name, i in zip(SOLUTION, results, strict=True)}, failed[back]
 
     def twin(self) -> "ConicSolver":
         """Return an equal solver with a new memory."""

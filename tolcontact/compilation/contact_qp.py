@@ -19,6 +19,7 @@ import numpy as np
 from tolcontact.compilation.calls import Call, FunctionCalls, inline
 from tolcontact.compilation.conditioning import conditioned
 from tolcontact.compilation.contact_rows import contact_rows, row_points, spring_energy, standing_points
+from tolcontact.compilation.elastic_columns import ElasticColumns
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.outcome import outcome
 from tolcontact.compilation.pair_terms import is_summed, summed_terms
@@ -60,7 +61,7 @@ class ContactQP:
     has_springs  whether any row is compliant
     equations    number of equations: the QP's last rows, for two-sided locators that the objective makes exact
     standing     for each pair of the group the contact points that always have a row, or the number of its slots
-    flexibility  of the rows; None without elastic parts
+    elastic      the columns of elastic parts, which `assemble` leaves out; None without elastic parts
     """
 
     assemble: ca.Function
@@ -71,12 +72,17 @@ class ContactQP:
     has_springs: bool
     equations: int
     standing: Standing
-    flexibility: Flexibility | None = None
+    elastic: ElasticColumns | None = None
+
+    @property
+    def flexibility(self) -> Flexibility | None:
+        """The flexibility of the rows; None without elastic parts."""
+        return None if self.elastic is None else self.elastic.flexibility
 
     @property
     def free_slacks(self) -> int:
         """The number of slacks that are not bounded, the last of them all."""
-        return 0 if self.flexibility is None else len(self.flexibility.rows)
+        return 0 if self.elastic is None else len(self.elastic.flexibility.rows)
 
     @property
     def equalities(self) -> np.ndarray:
@@ -98,8 +104,13 @@ class ContactQP:
         return Evaluators(NamedFunction(self.assemble), NamedFunction(self.finish), *dense)
 
     def sparsity(self, name: str) -> ca.Sparsity:
-        """Return the sparsity of an output of `assemble`."""
-        return self.assemble.sparsity_out(name)
+        """Return the sparsity of an output of `assemble`, with the columns of elastic parts."""
+        sparsity = self.assemble.sparsity_out(name)
+        return sparsity if self.elastic is None else self.elastic.sparsity(name, sparsity)
+
+    def whole(self, problem: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+        """Return the outputs of `assemble` (realization, entry) with the columns of elastic parts."""
+        return problem if self.elastic is None else self.elastic.joined(problem)
 
     @property
     def spans(self) -> list[slice]:
@@ -141,7 +152,7 @@ def contact_qp(
     locator_residual     largest misfit [mm] of exact two-sided locators at `corrected`
     """
     standing = standing or [standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
-    inputs = _inputs(nominal, group, standing)
+    inputs = _inputs(nominal, group, standing, bends=flexibility is not None)
     system = _equations(nominal, group, method, inputs)
     motion = system.motion(poses_of(inputs["poses"]))
     current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
@@ -151,7 +162,7 @@ def contact_qp(
     if isinstance(call, FunctionCalls):
         rows, terms = summed_terms(system, points, current, reactions, call, projects=projects)
     else:
-        rows = contact_rows(system, points, current, moved, reactions).bent(flexibility)
+        rows = contact_rows(system, points, current, moved, reactions).between_elastic(flexibility, inputs.get("bent"))
         terms = quadratic_terms(system, rows, motion, reactions, ca.sum1(reactions), projects=projects)
     exact = misfit(system, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
     problem = conditioned(
@@ -171,7 +182,7 @@ def contact_qp(
         has_springs=group.has_springs,
         equations=exact.numel(),
         standing=standing,
-        flexibility=flexibility,
+        elastic=None if flexibility is None else ElasticColumns(flexibility, float(terms.scale), float(group.length)),
     )
 
 
@@ -187,7 +198,7 @@ def _equations(nominal: Nominal, group: Group, method: Method, inputs: Mapping[s
     )  # fmt: skip
 
 
-def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.SX]:
+def _inputs(nominal: Nominal, group: Group, standing: Standing, *, bends: bool = False) -> dict[str, ca.SX]:
     """Return the symbols of all inputs by name, for `p` parts, `k` rows and contributors (c).
 
     If only few points of a pair can be the deepest, each of them always has a row. The `v` other pairs have slots, `m` in all,
@@ -203,6 +214,7 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
     proximal_weight      if points are projected in each step: weight of the proximal term, the squared motion of all contact
                          points in the step
     reactions (k)        if `newton`: the reaction of each row's point in the previous step
+    bent (k)             if there are elastic parts: opening [mm] of each row by the reactions; in `assemble` the previous ones
     bend (12 v)          if `newton`: sum, over the points in the slots of the previous step, of reaction times gap gradient by
                          the entries of X_RM
     P_m, P_r, n_r (3, m) the contact points in the slots
@@ -226,6 +238,8 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
         "n_r": (3, slots),
         "filled": (slots, 1),
     }
+    if bends:
+        shapes["bent"] = (rows, 1)
     return {name: ca.SX.sym(name, *shape) for name, shape in shapes.items()}
 
 

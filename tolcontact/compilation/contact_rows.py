@@ -47,6 +47,7 @@ class Rows:
     bends       (12 * pair, 1): sums of previous reaction times gap gradient by the entries of X_RM
     compliance  (row, 1) [mm/N]: of compliant points; 0 for rigid rows
     flexibility of all rows, if there are elastic parts; `compliance` is then its diagonal
+    bent        (row, 1) [mm]: opening of the rows by the previous reactions, if there are elastic parts
     curvature, hollow_curvature   (z, z): sums of previous reaction times second derivative of gaps that are not linear in X_RM
                 (see round_gaps)
     """
@@ -61,6 +62,7 @@ class Rows:
     curvature: ca.SX
     hollow_curvature: ca.SX
     flexibility: Flexibility | None = None
+    bent: ca.SX | None = None
 
     def __len__(self) -> int:
         return len(self.pairs)
@@ -70,18 +72,16 @@ class Rows:
         """The compliant rows."""
         return springs_of(self.compliance)
 
-    def bent(self, flexibility: Flexibility | None) -> "Rows":
-        """Return the rows between elastic parts; the same ones if there are none."""
+    def between_elastic(self, flexibility: Flexibility | None, bent: ca.SX | None) -> "Rows":
+        """Return the rows between elastic parts, which previous reactions have `bent`; the same ones if there are none."""
         if flexibility is None:
             return self
         compliance = ca.SX(ca.sparsify(ca.DM(np.diag(flexibility.C))))
-        return replace(self, gaps=self.gaps + flexibility.opening, compliance=compliance, flexibility=flexibility)
+        return replace(self, gaps=self.gaps + flexibility.opening, compliance=compliance, flexibility=flexibility, bent=bent)
 
     def opened(self, reactions: ca.SX) -> ca.SX:
         """Return the gaps (row, 1) [mm] under reactions (row, 1) [N], at z = 0."""
-        if self.flexibility is None:
-            return self.gaps + self.compliance * reactions
-        return self.gaps + ca.DM(self.flexibility.C) @ reactions
+        return self.gaps + (self.compliance * reactions if self.bent is None else self.bent)
 
 
 def springs_of(compliance: ca.SX) -> list[int]:

@@ -28,6 +28,7 @@ class ContactSolver:
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
         self._order = band_order(qp.sparsity("h"), qp.sparsity("a"), slacks=qp.slacks)
         self._equalities = qp.equalities
+        self._kernel = None if qp.elastic is None else SOLVERS["graph"].solver(qp)
         self._max_dense = max(MAX_DENSE_ENTRIES // (sum(qp.sparsity("a").shape) + qp.slacks) ** 2, 1)
         self._start_with(choice.solver(qp))
 
@@ -61,7 +62,7 @@ class ContactSolver:
         answer = self._solved(self._solver, inputs)
         answer["second"] = np.zeros_like(answer["residual"])
         self._retry(self._solver, answer, inputs, _is_lost(answer) & (inputs["newton"][:, 0] != 0), second=0.0)
-        for name in self._choice.fallbacks:
+        for name in self._choice.fallbacks if self._kernel is None else ("graph", *self._choice.fallbacks):
             lost = _is_lost(answer)
             if not lost.any():
                 break
@@ -102,6 +103,8 @@ class ContactSolver:
         return parts[0] if len(parts) == 1 else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def _solved_batch(self, solver: Solver, inputs: Arrays) -> Arrays:
+        if self._qp.flexibility is not None:
+            inputs = inputs | {"bent": self._qp.flexibility.bent(inputs["reactions"] * inputs["newton"])}
         problem = self._assemble(**inputs)
         slacks = np.ones((len(inputs["guess"]), self._qp.slacks))  # an active compliant row has a positive slack
         slacks[:, : inputs["guessed_slack"].shape[1]] = inputs["guessed_slack"]
@@ -122,11 +125,16 @@ class ContactSolver:
         """Return the outputs for the predicted active set, and which problems it is optimal for.
 
         The guess predicts the active set, since small steps seldom change it. Outputs of other problems are arbitrary.
+        The active set of elastic parts is not predicted, but found by the solver in the reactions.
         """
+        if self._kernel is not None:
+            solution, failed = self._kernel(problem, inputs["guess"], slacks)
+            outputs = self._finished(inputs | problem | solution)
+            return outputs, ~failed & ~(_is_rough(outputs) & ~(outputs["slack"] > ACCURACY).any(axis=1))
         active = np.zeros((len(slacks), self._qp.sparsity("a").size1()), dtype=np.bool_)
         active[:, : inputs["guess"].shape[1]] = inputs["guess"] > 0
         active[:, self._equalities] = True
-        outputs: Arrays = {}
+        outputs = {}
         predicted = np.zeros(len(slacks), dtype=np.bool_)
         for rows in self._parts(np.flatnonzero(inputs["guess"].any(axis=1))):
             systems = self._dense_problem(problem, rows)
@@ -143,15 +151,32 @@ class ContactSolver:
         outputs["residual"][failed] = np.inf
         for rows in self._parts(np.flatnonzero(_is_rough(outputs) & np.isfinite(outputs["residual"][:, 0]))):
             systems = self._dense_problem(problem, rows)
-            solutions, slacks = _of(solution, rows), self._qp.slacks
+            solutions, slacks = self._whole_solution(systems, _of(solution, rows)), self._qp.slacks
             active = ActiveSet.of_answer(systems, solutions, self._equalities, slacks, self._qp.free_slacks)
             answer = self._finished(_of(inputs, rows) | _of(problem, rows) | active.answer(systems, self._order))
             better = answer["residual"][:, 0] < outputs["residual"][rows, 0]
             _replace(outputs, rows[better], _of(answer, better))
         return outputs
 
+    def _whole_solution(self, systems: dict[str, np.ndarray], solution: Arrays) -> Arrays:
+        """Return solutions with the slacks of elastic parts, which follow from the reactions."""
+        size = solution["x"].shape[1]
+        if size == systems["a"].shape[2]:
+            return solution
+        slacks = -np.einsum("kij,ki->kj", systems["a"][:, :, size:], solution["lam_a"])
+        x, lam_x = solution["x"], solution["lam_x"]
+        return solution | {"x": np.hstack([x, slacks]), "lam_x": np.hstack([lam_x, np.zeros_like(slacks)])}
+
     def _finished(self, arrays: Arrays) -> Arrays:
+        """Return the outputs of `finish`; elastic parts bend by the reactions, and rows in conflict are `opened`."""
+        elastic, size = self._qp.elastic, self._qp.assemble.size1_out("h")
+        if elastic is not None:
+            bent = elastic.flexibility.bent(elastic.reactions(arrays["lam_a"], arrays["length"]))
+            bent += arrays.get("opened", 0)
+            arrays = arrays | {"bent": bent, "x": arrays["x"][:, :size], "lam_x": arrays["lam_x"][:, :size]}
         outputs = self._finish(**arrays)
+        if "opened" in arrays:
+            outputs["slack"] += np.maximum.reduceat(np.abs(arrays["opened"]), [span.start for span in self._qp.spans], axis=1)
         usable = np.isfinite(outputs["corrected"]).all(axis=1)
         residual = outputs["residual"]
         residual[~(usable & np.isfinite(residual[:, 0]))] = np.inf
@@ -162,7 +187,8 @@ class ContactSolver:
         return np.split(rows, range(self._max_dense, len(rows), self._max_dense)) if rows.size else []
 
     def _dense_problem(self, problem: Arrays, rows: np.ndarray) -> dict[str, np.ndarray]:
-        return {name: self._dense(name, problem[name][rows]) for name in ("h", "g", "a", "lba")}
+        whole = self._qp.whole({name: problem[name][rows] for name in ("h", "g", "a", "lba", "length")})
+        return {name: self._dense(name, whole[name]) for name in ("h", "g", "a", "lba")}
 
     def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
         """Return all entries of an output of `assemble`: (realization, row, column), or (realization, row) of a vector."""

@@ -34,15 +34,16 @@ def outcome(
     the QP that was solved.
     """
     group, z, count = system.group, system.z, len(rows)
-    slacks = len(group.pairs) + len(rows.springs)
-    bounded = slacks if rows.flexibility is None else len(group.pairs)
+    slacks = len(group.pairs) + (len(rows.springs) if rows.flexibility is None else 0)
     size, equations = z.numel() + slacks, problem["a"].size1() - count
     symbols = {name: ca.SX.sym(name, problem[name].sparsity()) for name in QP_ENTRIES}
     symbols |= {"x": ca.SX.sym("x", size), "lam_a": ca.SX.sym("lam_a", count + equations), "lam_x": ca.SX.sym("lam_x", size)}
     x, lam_a, lam_x, length = symbols["x"], symbols["lam_a"], symbols["lam_x"], symbols["length"]
     y, s, lam_s = x[: z.numel()], x[z.numel() :], lam_x[z.numel() :]
     excess = ca.vertcat(*_products(symbols["a"], x, _spans(rows.pairs, equations), call)) - symbols["lba"]
-    natural = ca.vertcat(row_residuals(rows, excess[:count], lam_a[:count], length), ca.fmin(s, -lam_s)[:bounded])
+    if rows.bent is not None:
+        excess += ca.vertcat(rows.bent / length, ca.SX(equations, 1))
+    natural = ca.vertcat(row_residuals(rows, excess[:count], lam_a[:count], length), ca.fmin(s, -lam_s))
     movers = [slice(k, k + FREEDOMS) for k in range(0, z.numel(), FREEDOMS)] + [slice(z.numel(), size)]
     pull, push = (_products(matrix, values, movers, call) for matrix, values in ((symbols["h"], x), (symbols["a"].T, lam_a)))
     stationarity = ca.norm_inf(ca.vertcat(*pull) + symbols["g"] + ca.vertcat(*push) + lam_x)

@@ -16,17 +16,15 @@ from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.measure_accuracy import measure_accuracies
 from tolcontact.compilation.method_checks import check_forces, check_method
 from tolcontact.compilation.solver import SolverChoice
-from tolcontact.compilation.solvers import SOLVERS, solver_choice, usable_solvers
+from tolcontact.compilation.solvers import solver_choice
 from tolcontact.compilation.station_program import StationProgram, station_programs
 from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints, coordinates_in_words
-from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.interference import Watch
 from tolcontact.limits import Limits
 from tolcontact.mechanics.flexibility import (
     Bending,
-    Bodies,
     elastic_bodies,
     group_flexibility,
     part_flexibilities,
@@ -150,14 +148,6 @@ class Program(Pictured):
         return f"{words}; they are fixed, and err by {trial.error:.2g} mm at most"
 
 
-def _check_bends(choice: SolverChoice, bodies: Bodies) -> None:
-    """Raise OptionError for elastic parts and a solver that has none."""
-    if bodies and not choice.bends:
-        with quiet():  # each solves a small problem
-            able = ", ".join(name for name in usable_solvers() if SOLVERS[name].bends)
-        raise OptionError(f'solver "{choice.name}" has no elastic parts, and the model has; choose one of: {able}')
-
-
 def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     """Build all Functions of a model.
 
@@ -174,7 +164,6 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         values = measured(nominal, poses_of(entries), d)
         place, observe = _place(nominal, d), _observe(nominal, entries, d, values)
         bodies = elastic_bodies(nominal)
-        _check_bends(choice, bodies)
         groups = [with_weights(group, nominal, bodies) for group in contact_groups(nominal, weighs_areas=method.is_exact)]
         if method.minimizes.presses:
             check_forces(nominal, groups)

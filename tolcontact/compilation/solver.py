@@ -32,7 +32,8 @@ class Solver(Protocol):
     ) -> tuple[dict[str, Float[Array, "realization _"]], Bool[Array, " realization"]]:
         """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver failed.
 
-        Probably, rows with `reactions` are active, and `slacks` above zero are open.
+        Probably, rows with `reactions` are active, and `slacks` above zero are open. A solver of elastic parts also returns
+        `opened` (realization, row) [mm]: the penetration that it left to rows which contradict each other.
         """
         ...
 
@@ -48,7 +49,6 @@ class SolverChoice(ABC):
     options     its options, which archives state
     fallbacks   names of the solvers that answer in its place, tried in order, if its answer misses ACCURACY
     remembers   whether it starts each problem from the previous answer
-    bends       whether it solves QPs with elastic parts
     growth      the time of a problem grows with this power of the number of coupled bodies
     """
 
@@ -57,7 +57,6 @@ class SolverChoice(ABC):
     fallbacks: tuple[str, ...] = ("qpoases", "daqp", "piqp")
     remembers: bool = False
     growth: int = 3
-    bends: bool = True
 
     @abstractmethod
     def is_usable(self) -> bool:

@@ -24,7 +24,7 @@ _CHOICES: tuple[SolverChoice, ...] = (
     # It cycles if rows contradict each other and two-sided locators are exact; there, qpOASES fails sometimes.
     # Parallel rows that differ only by stiff springs are not dependent: its default limit of 1e-11 would drop some.
     Plugin("daqp", {"daqp": DAQP}, fallbacks=("qpoases", "piqp"), springs={"daqp": {**DAQP, "zero_tol": 1e-15}}),
-    GraphChoice("graph", fallbacks=("daqp", "qpoases", "piqp"), growth=1, bends=False),
+    GraphChoice("graph", fallbacks=("daqp", "qpoases", "piqp"), growth=1),
     Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}),
     Plugin("highs", {"highs": {"output_flag": False}}, remembers=True),
     Plugin("proxqp", {"proxqp": PROXQP}),

@@ -125,7 +125,7 @@ def repeat(
         if candidates.change:
             _find_places(candidates, unsettled, phase.width, (size[moves] < NEARLY_AT_REST) & phase.sharp, start)
         if phase.newton:
-            penetration = _true_penetration(unsettled.task, unsettled.state)
+            penetration = unsettled.state.slack if step.bends else _true_penetration(unsettled.task, unsettled.state)
             progress = progress or Progress.start(unsettled.state)
             progress.look(unsettled.state, penetration, unrest, is_held=phase.firmness > 1)
             ends = progress.is_over(_is_stuck(unsettled.state))

@@ -169,6 +169,7 @@ class ContactResolver:
                 misfit = spring_misfit(pair, gaps, reactions)
             else:
                 gaps += openings[:, span]
+                gaps = -np.abs(gaps) if pair.holds else gaps  # it has no gap, either way
                 state.gap_min[:, k] = gaps.min(axis=1)
                 misfit = elastic_misfit(pair, gaps, reactions * np.diag(flexibility.C)[span])
             depth[:, k] = misfit - state.slack[:, k]
@@ -245,7 +246,7 @@ class ContactResolver:
         energy = self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
         if self.flexibility is None:
             return energy
-        bent = self.flexibility.openings(state.multipliers) - self.flexibility.opening
+        bent = self.flexibility.bent(state.multipliers)
         return np.asarray(energy + (state.multipliers * bent).sum(axis=1) / 2 / self._force)
 
     def _at_nominal(self, task: Task) -> tuple[np.ndarray, np.ndarray]:

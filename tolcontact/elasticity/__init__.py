@@ -4,9 +4,9 @@
 """
 
 from tolcontact.elasticity.bodies import elastic_body
-from tolcontact.elasticity.elastic_body import ElasticBody, flexibility
+from tolcontact.elasticity.elastic_body import ElasticBody, flexibility, responses
 from tolcontact.elasticity.imported_body import MAX_OFFSET
 from tolcontact.elasticity.node_table import node_table
 from tolcontact.elasticity.sources import MatrixSource, MeshSource
 
-__all__ = ["MAX_OFFSET", "ElasticBody", "MatrixSource", "MeshSource", "elastic_body", "flexibility", "node_table"]
+__all__ = ["MAX_OFFSET", "ElasticBody", "MatrixSource", "MeshSource", "elastic_body", "flexibility", "node_table", "responses"]

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+import scipy
 from scipy import sparse
 
 from tolcontact import code_cache
@@ -15,6 +16,7 @@ from tolcontact.arrays import Array, Float
 from tolcontact.errors import GeometryFault
 
 BLOCK_LOADS = 64  # solved at a time: the displacements of one block are in memory
+FEW_NODES, NEIGHBOURS = 200, 16  # up to this number, displacements are interpolated between all nodes; else between the nearest
 
 
 class Pads(Protocol):
@@ -53,6 +55,8 @@ class ElasticBody:
         None is twice the volume by the surface area, the thickness of a sheet. On an imported matrix it acts on the node at its
         point. Raises GeometryFault if there is no such node or surface.
         """
+        if not len(points):  # of a part where nothing is measured
+            return sparse.csc_array((self.nodes.size, 0))
         return self.pads(points, directions, radius)
 
     def weight(self, acceleration: Float[Array, " 3"]) -> Float[Array, " force"]:
@@ -87,12 +91,20 @@ def flexibility(body: ElasticBody, loads: sparse.csc_array) -> Float[Array, "loa
 
     By Betti's theorem it is symmetric; rounding is evened out. It is kept in the cache folder of the user.
     """
-    key = "flexibility-" + digest(_sources(), body.key.encode(), body.shares, loads.data, loads.indices, loads.indptr)
-    stored = code_cache.load(key)
+    return responses(body, loads, np.zeros((0, 3)))[0]
+
+
+def responses(
+    body: ElasticBody, loads: sparse.csc_array, points: Float[Array, "point 3"]
+) -> tuple[Float[Array, "load load"], Float[Array, "point 3 load"]]:
+    """Return the flexibility among `loads`, and the displacements at `points` [mm], which are interpolated between nodes."""
+    key = "flexibility-" + digest(_sources(), body.key.encode(), body.shares, loads.data, loads.indices, loads.indptr, points)
+    stored, count = code_cache.load(key), loads.shape[1]
     if stored is None:
-        stored = _flexibility(body, loads).tobytes()
+        stored = np.concatenate(_responses(body, loads, points)).tobytes()
         code_cache.store(key, stored)
-    return np.frombuffer(stored).reshape(loads.shape[1], loads.shape[1])
+    values = np.frombuffer(stored).reshape(-1, count)
+    return values[:count], values[count:].reshape(len(points), 3, count)
 
 
 def digest(*contents: np.ndarray | bytes) -> str:
@@ -107,11 +119,18 @@ def _sources() -> bytes:
     return b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
 
 
-def _flexibility(body: ElasticBody, loads: sparse.csc_array) -> np.ndarray:
-    blocks = range(0, loads.shape[1], BLOCK_LOADS)
-    columns = [loads.T @ body.response(loads[:, start : start + BLOCK_LOADS].toarray()) for start in blocks]
-    matrix = np.concatenate(columns, axis=1) if columns else np.zeros((0, 0))
-    return (matrix + matrix.T) / 2
+def _responses(body: ElasticBody, loads: sparse.csc_array, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    count, near = loads.shape[1], NEIGHBOURS if len(body.nodes) > FEW_NODES else None
+    matrix, fields = np.zeros((count, count)), np.zeros((3 * len(points), count))
+    for start in range(0, count, BLOCK_LOADS):
+        block = slice(start, start + BLOCK_LOADS)
+        displacements = body.response(loads[:, block].toarray())
+        matrix[:, block] = loads.T @ displacements
+        if len(points):
+            at_nodes = displacements.reshape(len(body.nodes), -1)
+            spline = scipy.interpolate.RBFInterpolator(body.nodes, at_nodes, near, kernel="linear", degree=0)
+            fields[:, block] = spline(points).reshape(len(fields), -1)
+    return (matrix + matrix.T) / 2, fields
 
 
 def rigid_motions(nodes: Float[Array, "node 3"], shares: Float[Array, " node"]) -> Float[Array, "force 6"]:

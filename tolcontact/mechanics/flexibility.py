@@ -20,10 +20,11 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.declaration import Mesh, Part, Point
 from tolcontact.discretization import Nominal, NominalPart, Weld
-from tolcontact.elasticity import ElasticBody, MatrixSource, MeshSource, elastic_body, flexibility
+from tolcontact.elasticity import ElasticBody, MatrixSource, MeshSource, elastic_body, responses
 from tolcontact.errors import Faults, GeometryFault, designation
 from tolcontact.geometry.files import FROM_PRODUCT
 from tolcontact.mechanics.groups import Group, Load
+from tolcontact.mechanics.opening_kernel import add_openings
 
 NULL = 1e-14  # of the largest eigenvalue of C, scaled to a unit diagonal: smaller ones are rounding
 SAME = 1e-12  # of the largest eigenvalue: of fewer motions at two-sided locators than there are locators
@@ -65,8 +66,13 @@ class Flexibility:
     def openings(self, reactions: Float[Array, "realization row"]) -> Float[Array, "realization row"]:
         """Return the openings (realization, row) [mm] under reactions [N] of the rows, summed up in a fixed order."""
         openings = np.tile(self.opening, (len(reactions), 1))
-        for row in np.flatnonzero(reactions.any(axis=0)):
-            openings += reactions[:, row, None] * self.C[row]
+        add_openings(self.C, np.ascontiguousarray(reactions), openings)
+        return openings
+
+    def bent(self, reactions: Float[Array, "realization row"]) -> Float[Array, "realization row"]:
+        """Return C l (realization, row) [mm]: the openings by reactions [N] of the rows, without constant forces."""
+        openings = np.zeros(reactions.shape)
+        add_openings(self.C, np.ascontiguousarray(reactions), openings)
         return openings
 
 
@@ -81,6 +87,7 @@ class PartFlexibility(NamedTuple):
     opening    (k,) [mm] by the constant forces
     points     (point, 3) nominal places [mm] whose displacements are measured
     moved      (point, 3, k + 1) their displacements per load [mm/N], and last by the constant forces [mm]
+    surface    (vertex, 3, k + 1) the same of the vertices of its surface, in the nominal assembly frame; none of joined parts
     """
 
     part: int
@@ -91,6 +98,7 @@ class PartFlexibility(NamedTuple):
     opening: Float[Array, " k"]
     points: Float[Array, "point 3"]
     moved: Float[Array, "point 3 load"]
+    surface: Float[Array, "vertex 3 load"]
 
     def place(self, point: Float[Array, " 3"]) -> int:
         """Return the index of a measured point."""
@@ -220,11 +228,13 @@ def _part_flexibility(nominal: Nominal, index: int, body: ElasticBody) -> PartFl
             constant += _spread(part, body, at[None], vector[None]).toarray()[:, 0]
     if nominal.assembly.acceleration is not None:
         constant += _nodal_weight(part, body, nominal)
-    G = flexibility(body, sparse.hstack([*loads, sparse.csc_array(constant[:, None])], format="csc"))
-    k = len(P)
+    (R, t), k = part.placement, len(P)
+    shown = (part.vertices - t) @ R if index in nominal.last_indices else np.zeros((0, 3))
+    G, surface = responses(body, sparse.hstack([*loads, sparse.csc_array(constant[:, None])], format="csc"), shown)
+    surface = np.einsum("ij,vjk->vik", R, surface[:, :, [*range(k), -1]])
     _check_holding(nominal, index, loads_on_part, P, n, G[:k, :k])
     moved = G[k:-1][:, [*range(k), -1]].reshape(len(points), 3, k + 1)
-    return PartFlexibility(index, len(body.nodes), body.mass, loads_on_part, G[:k, :k], G[:k, -1], points, moved)
+    return PartFlexibility(index, len(body.nodes), body.mass, loads_on_part, G[:k, :k], G[:k, -1], points, moved, surface)
 
 
 def _check_holding(nominal: Nominal, index: int, loads: np.ndarray, P: np.ndarray, n: np.ndarray, C: np.ndarray) -> None:

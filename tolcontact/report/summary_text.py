@@ -35,7 +35,6 @@ NEEDS = {  # realizations, of statistics that have no interval
     terms.SKEWNESS: f"skewness and kurtosis need {MIN_SHAPE} realizations, and a kurtosis below {MAX_KURTOSIS:g}",
     terms.PPK: f"Pp and Ppk need {grouped(MIN_TAIL)} realizations, {grouped(MIN_TAILS)} with two limits",
 }
-RIGID_FIELDS = "of elastic parts the rigid motion alone, without their bending, which measurements include"
 
 
 def summary_text(summary: xr.Dataset, *, is_whole: bool = False) -> Group:
@@ -66,8 +65,6 @@ def _sections(summary: xr.Dataset, *, is_whole: bool) -> Iterator[Text | Table |
     yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
     if magnitudes < count:
         yield Text(f"of at least the first {grouped(magnitudes)} realizations" if magnitudes else "not summed up")
-    if summary.attrs["elastic_parts"]:
-        yield Text(RIGID_FIELDS)
     if magnitudes:
         yield _field_table(summary, is_whole=is_whole)
     yield Text("\ncontact", style="bold")
@@ -210,7 +207,7 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     if shifted := summary.attrs["datum_shifts"]:
         yield f"datum shift of {shifted}: not drawn; contact of the datum features determines it"
     if elastic := summary.attrs["elastic_parts"]:
-        yield f"elastic parts: {elastic}; certificates hold at their contact points, bent; fields show their rigid motion"
+        yield f"elastic parts: {elastic}; certificates hold at their contact points, bent"
     if stored := summary.attrs["stored_coordinates"]:
         yield stored
     yield from summary.attrs["correlations"].splitlines()

@@ -44,6 +44,49 @@ def add_scatter(A, mean, scatter):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def add_wide_scatter(A, mean, scatter):  # type: ignore[no-untyped-def]
+    """Write the mean (3, w) of A (n, 3, w), and add the products of the rows' deviations from it to scatter (3, w, w)."""
+    n, _, width = A.shape
+    difference = np.empty(width)
+    for i in range(3):
+        for p in range(width):
+            total = 0.0
+            for k in range(n):
+                total += A[k, i, p]
+            mean[i, p] = total / n
+        for k in range(n):
+            for p in range(width):
+                difference[p] = A[k, i, p] - mean[i, p]
+            for p in range(width):
+                value = difference[p]
+                if value != 0.0:
+                    for q in range(width):
+                        scatter[i, p, q] += value * difference[q]
+
+
+@compiled
+def add_bent_magnitudes(A, basis, shift, powers):  # type: ignore[no-untyped-def]
+    """Add powers as add_magnitudes does, for u = A . basis with A (n, 3, w) and basis (3, w, point)."""
+    u = np.empty((3, shift.size))
+    for k in range(A.shape[0]):
+        for i in range(3):
+            for v in range(shift.size):
+                u[i, v] = 0.0
+            for p in range(A.shape[2]):
+                value = A[k, i, p]
+                if value != 0.0:
+                    for v in range(shift.size):
+                        u[i, v] += value * basis[i, p, v]
+        for v in range(shift.size):
+            power1 = np.sqrt(u[0, v] ** 2 + u[1, v] ** 2 + u[2, v] ** 2) - shift[v]
+            power2 = power1 * power1
+            powers[0, v] += power1
+            powers[1, v] += power2
+            powers[2, v] += power2 * power1
+            powers[3, v] += power2 * power2
+
+
+@compiled
 def add_magnitudes(A, points, shift, powers):  # type: ignore[no-untyped-def]
     """Add to powers (4, point) the first to fourth power of |u| - shift, realization after realization.
 

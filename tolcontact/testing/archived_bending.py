@@ -7,11 +7,15 @@ from tolcontact import vocabulary as terms
 
 
 class ArchivedBending:
-    """How elastic parts open the gaps at some contact points, by their indices; `loads` are the loads at these points."""
+    """How elastic parts open the gaps at some contact points, by their indices; `loads` are the loads at these points.
+
+    holds   (load,): whether it is a two-sided locator, whose gap counts either way
+    """
 
     def __init__(self, tree: xr.DataTree, points: np.ndarray) -> None:
         group = tree.children[terms.ELASTIC_GROUP].to_dataset()
         self.loads = np.flatnonzero(np.isin(group[terms.POINT_OF_LOAD.name].values, points))
+        self.holds = group[terms.HOLDS.name].values[self.loads] != 0
         self._by_load = group[terms.FLEXIBILITY.name].values[self.loads]
         self._by_forces = group[terms.OPENING.name].values[self.loads]
         self._weld_rows = group[terms.WELD_OF_LOAD.name].values[self.loads]

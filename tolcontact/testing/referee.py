@@ -238,6 +238,7 @@ class ArchivedPair:
         if self.bending is not None and self.bending.loads.size:
             gaps[:, terms.CORRECTED] += self.bending.openings(_needed(rows, terms.LOAD.name, piece))
             gaps[:, terms.CORRECTED] -= self.bending.kept(_needed(rows, terms.WELD_GAP.name, piece))
+            gaps[:, terms.CORRECTED, self.bending.holds] *= -np.sign(gaps[:, terms.CORRECTED, self.bending.holds])
         return gaps
 
     def _rigid_gaps(self, rows: Rows, piece: slice) -> np.ndarray:

@@ -86,7 +86,10 @@ class _BlockReduction(ProgramFunction):
         # Reprojected contact points differ from the points of the model.
         rows = np.flatnonzero(block.searched[: max(self.counted - block.start, 0)] == 0)
         counts = count_touching(program, block.poses[rows, CORRECTED], block.deviations[rows])
-        return row_values(block, self.kept, program.nominal), (self.fields.sums(block.poses, block.start, block.status), counts)
+        return row_values(block, self.kept, program.nominal), (
+            self.fields.sums(block.poses, block.start, block.status, block.load),
+            counts,
+        )
 
 
 class RunSums:
@@ -94,7 +97,8 @@ class RunSums:
 
     def __init__(self, program: Program, run: Run) -> None:
         self._program, self._seed = program, run.seed
-        self._fields = DisplacementFields(program.nominal, str(run.fields))
+        bending = program.bending
+        self._fields = DisplacementFields(program.nominal, str(run.fields), bending.parts if bending else None)
         pairs = program.nominal.pairs  # without pairs of elastic parts, which touch where they are bent
         self._is_counted = np.concatenate([np.zeros(0, dtype=bool), *(np.full(len(p.P_m), not p.elastic) for p in pairs)])
 

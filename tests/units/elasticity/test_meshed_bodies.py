@@ -11,7 +11,7 @@ from scipy.sparse import linalg as sparse_linalg
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from tolcontact.elasticity import MeshSource, elastic_body, flexibility
+from tolcontact.elasticity import MeshSource, elastic_body, flexibility, responses
 from tolcontact.elasticity.meshed_body import body_of
 from tolcontact.elasticity.tetrahedra import EDGES, Tetrahedra, shape_functions, stiffness_of
 from tolcontact.errors import GeometryFault
@@ -175,6 +175,17 @@ def test_a_body_from_its_step_file_has_true_round_faces():
     for body in bodies:
         assert body.mass == pytest.approx(surface.volume * 2.7e-6, rel=1e-4)
     assert flexibilities[0] == pytest.approx(flexibilities[1], rel=0.02)
+
+
+def test_a_bent_surface_is_the_line_of_a_beam_between_nodes_too(beam):
+    """Half the deflection over a quarter of the span: 11/16 of the middle's by bending, half by shear."""
+    loads = up(beam, [(10, 10, 0), (390, 10, 0), (200, 10, 0)], 2.5)
+    places = np.array([(x, 10.3, H) for x in (10.0, 105.2, 200.4, 390.0)])
+    _, surface = responses(beam, loads, places)
+    ends, quarter, middle = (surface[k, 2] @ [-0.5, -0.5, 1] for k in ([0, 3], 1, 2))
+    bending, shear = 380**3 / 48 / E / (B * H**3 / 12), 380 / 4 / (5 / 6 * B * H * E / 2)
+    assert middle - ends.mean() == pytest.approx(bending + shear, rel=5e-3)
+    assert quarter - ends.mean() == pytest.approx(11 / 16 * bending + shear / 2, rel=1e-2)
 
 
 def test_a_flexibility_is_computed_once_for_equal_bodies_and_loads(beam):

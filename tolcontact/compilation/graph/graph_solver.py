@@ -7,6 +7,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation.contact_qp import ContactQP
+from tolcontact.compilation.elastic_solver import ElasticSolver
 from tolcontact.compilation.graph.factor_kernel import Work
 from tolcontact.compilation.graph.layout import POSITION, Layout, Storage, layout
 from tolcontact.compilation.graph.solve_kernel import solve_batch
@@ -26,7 +27,9 @@ class GraphChoice(SolverChoice):
         """Return True: the solver is part of this package."""
         return True
 
-    def solver(self, qp: ContactQP) -> "GraphSolver":
+    def solver(self, qp: ContactQP) -> "GraphSolver | ElasticSolver":
+        if qp.elastic is not None:
+            return ElasticSolver(qp)
         sparsities = {name: qp.sparsity(name) for name in ("h", "g", "a", "lba")}
         return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations)
 

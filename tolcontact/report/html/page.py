@@ -31,7 +31,7 @@ from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.model_changes import model_changes
 from tolcontact.report.model_tables import archived_settings, chains_of, declaration_of, dimensions_of, model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
-from tolcontact.report.summary_text import RIGID_FIELDS, contact_lines, measure_table, pair_table
+from tolcontact.report.summary_text import contact_lines, measure_table, pair_table
 from tolcontact.statistics.capability import VERDICT_RULE
 
 HERE = Path(__file__).parent
@@ -108,7 +108,6 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
         "max_rows": MAX_ROWS,
         "run": {name: str(value) for name, value in archived_settings(results).items()},
         "missing": _missing(scene) if scene["parts"] else [],
-        "elastic": summary.attrs["elastic_parts"] and RIGID_FIELDS,
         "stations": scene["stations"],
     }
     data = {
