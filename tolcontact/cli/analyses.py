@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from tolcontact import vocabulary as terms
@@ -111,7 +110,8 @@ def _values(text: str) -> tuple[str, list[float]]:
         if ":" not in value:
             return name, [float(number) for number in value.split(",")]
         first, last, count = value.split(":")
-        return name, np.linspace(float(first), float(last), int(count)).tolist()
+        start, steps = float(first), int(count) - 1
+        return name, [start + (float(last) - start) * k / (steps or 1) for k in range(steps + 1)]
     except ValueError:
         raise OptionError(
             f'--over is "{text}"; expected --over angle=0:1.5:7 (from, to, number) or --over angle=0,0.5,1'

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
+import lazy_loader
 import typer
 
 from tolcontact import archive as archives, report as reports, workflow
@@ -24,6 +25,8 @@ from tolcontact.cli.output import (
 from tolcontact.cli.progress import waiting
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
+
+first_order = lazy_loader.load("tolcontact.analyses.first_order")  # few reports need its models
 
 
 @app.command(
@@ -75,7 +78,7 @@ def report(
     with waiting(f"writing the report of {archive}"), archives.open_archive(archive) as results:
         summary, titles = workflow.summarize(results), title_block_of(results.attrs).overridden(entries)
         if page is not None:
-            reports.write_page(results, summary, page, titles)
+            reports.write_page(results, summary, page, titles, lambda: first_order.first_order_variances(results))
         if xlsx is not None:
             reports.write_spreadsheet(results, summary, xlsx, titles)
     for kind, path in (("report", page), ("spreadsheet", xlsx)):

@@ -1,13 +1,14 @@
 """The contributors of each measurement, from the draws of the run itself: linear shares of variance, with contact."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.errors import TolcontactError
 from tolcontact.report.figures import NO_INTERVAL, grouped, percent
 from tolcontact.statistics.linear_shares import (
     MIN_EFFECTIVE,
@@ -28,13 +29,48 @@ class ContributorShares(NamedTuple):
     """The shares of the contributors of one measurement, the largest first, with a note.
 
     groups   contributors, or features with all their freedoms, joined if they are drawn jointly
-    shares   (group, interval) of the variance with contact; empty if none are shown
+    shares   (group, interval) of the variance; empty if none are shown
     note     a sentence: R^2, or the reason why no shares are shown
+    title    what they are shares of
     """
 
     groups: list[str]
     shares: np.ndarray
     note: str
+    title: str = "Contributors, with contact"
+
+
+def shares_or_first_order(
+    results: xr.DataTree, realizations: int, variances: Callable[[], np.ndarray] | None
+) -> list[ContributorShares]:
+    """Return the shares for each measurement; where none can be estimated, first-order ones from `variances`, if it is given.
+
+    It returns the variance (measure, contributor) that each contributor causes to first order, without contact.
+    """
+    estimated = contributor_shares(results, realizations)
+    if variances is None or all(shares.groups for shares in estimated):
+        return estimated
+    try:
+        rows = variances()
+    except TolcontactError:  # the model cannot be rebuilt
+        return estimated
+    return [
+        shares if shares.groups else _first_order(results, row, shares) for shares, row in zip(estimated, rows, strict=True)
+    ]
+
+
+def _first_order(results: xr.DataTree, variances: np.ndarray, instead: ContributorShares) -> ContributorShares:
+    """Return shares of variances (contributor,), or what is shown instead where they are not known."""
+    total = variances.sum()
+    if not 0 < total < np.inf:
+        return instead
+    columns = np.flatnonzero(variances > 0)
+    members = _groups(results, results["sample"].to_dataset(), columns)
+    shares = np.full((len(members), len(terms.ESTIMATE)), np.nan)
+    shares[:, 0] = [variances[columns[group]].sum() / total for group in members.values()]
+    order, names = np.argsort(-shares[:, 0], kind="stable"), list(members)
+    note = f"{instead.note} These are first-order shares, by sensitivities of the nominal assembly, without contact."
+    return ContributorShares([names[k] for k in order], shares[order], note, "Contributors, first order, without contact")
 
 
 def contributor_shares(results: xr.DataTree, realizations: int) -> list[ContributorShares]:

@@ -44,7 +44,7 @@ function showLimits(shown, measure) {
 }
 
 /** Charts are drawn in the colours and the widths of the window, but printed in black, as wide as paper; settings are unfolded. */
-const PAPER = [[".pictures .histogram", 520, 220], [".pictures .contributors", 520, 165], ["", 690, 300]]; // parent, px, px
+const PAPER = [[".pictures .histogram", 520, 220], [".pictures .contributors", 520, 230], ["", 690, 300]]; // parent, px, px
 function relayout(isPrinted) {
   const ink = isPrinted ? "#1a1c1f" : getComputedStyle(document.body).color;
   document.querySelectorAll(".js-plotly-plot").forEach((box) => {

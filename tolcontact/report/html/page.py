@@ -3,7 +3,7 @@
 import base64
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from tolcontact.replacing import replacing
 from tolcontact.report.analysis_tables import analysis_report
 from tolcontact.report.archived_analysis import archived_analysis
 from tolcontact.report.comparison_text import change_table, contributor_table, runs_lines, value_table
-from tolcontact.report.contributor_shares import ContributorShares, contributor_shares
+from tolcontact.report.contributor_shares import ContributorShares, contributor_shares, shares_or_first_order
 from tolcontact.report.convention_text import offset_table
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
@@ -61,9 +61,12 @@ MAX_CHANGES = 30  # of a model, that a comparison lists
 CASES_NOTE = "Those with contact are the first of the single realizations above."
 
 
-def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path, title_block: TitleBlock | None = None) -> None:
+def write_page(
+    results: xr.DataTree, summary: xr.Dataset, path: Path, title_block: TitleBlock | None = None,
+    variances: Callable[[], np.ndarray] | None = None,
+) -> None:  # fmt: skip
     """Write the report of a run (see page_of). Raises ArchiveError if the file cannot be written."""
-    _write(page_of(results, summary, title_block), path)
+    _write(page_of(results, summary, title_block, variances), path)
 
 
 def write_view(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
@@ -84,10 +87,16 @@ def is_page(path: Path) -> bool:
         return GENERATOR.encode() in file.read(1000)
 
 
-def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock | None = None) -> str:
-    """Return the report of a run with this summary; the default `title_block` comes from the archive."""
+def page_of(
+    results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock | None = None,
+    variances: Callable[[], np.ndarray] | None = None,
+) -> str:  # fmt: skip
+    """Return the report of a run with this summary; the default `title_block` comes from the archive.
+
+    Where shares of contributors cannot be estimated, `variances` is called for first-order ones (see shares_or_first_order).
+    """
     scene, titles = scene_of(results, summary), title_block or title_block_of(results.attrs)
-    shares, document = contributor_shares(results, summary.attrs["realizations"]), declaration_of(results)
+    shares, document = shares_or_first_order(results, summary.attrs["realizations"], variances), declaration_of(results)
     values = {
         "title": summary.attrs["title"],
         "titles": titles,
@@ -113,7 +122,7 @@ def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock |
     data = {
         "scene": scene,
         "charts": [
-            {**chart, "contributors": bars_of(of_measure)}
+            {**chart, "contributors": bars_of(of_measure), "contributorsTitle": of_measure.title}
             for chart, of_measure in zip(charts_of(results, summary), shares, strict=True)
         ],
         "relations": relations_of(results, summary),

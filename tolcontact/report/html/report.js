@@ -115,7 +115,7 @@ function contributors(measure, into) {
     },
     hovertemplate: "%{y}: %{x:.1f} %<extra></extra>",
   }];
-  const shown = layout("Contributors, with contact", "% of variance", "");
+  const shown = layout(measure.contributorsTitle, "% of variance", "");
   Object.assign(shown, { showlegend: false, bargap: 0.3 });
   Object.assign(shown.margin, { l: 12, t: 36 });
   Object.assign(shown.yaxis, { automargin: true, type: "category", dtick: 1 }); // all are labelled, on paper as well
