@@ -120,6 +120,8 @@ def _check_annotations(file: Path) -> None:
         raise OptionError(without_annotations(information, file))
     declared = declared_file(file, information)
     common.echo(declared)
+    if any(entry.reason for entry in declared.annotations):
+        common.echo("drawing: what is not declared does not count here; it may limit what is said to be open")
     _print_remarks(discretize(declared.assembly, incomplete=True))
 
 
