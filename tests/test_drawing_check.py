@@ -113,6 +113,7 @@ DRAWINGS = {
     "each datum first once": (turned_about(), None),
     "location": (block(tc.Perpendicularity(0.2, "A|B|C")), 'feature "far" .*limits offset: .*add tc.Position or tc.Profile'),
     "rough seat": (block(PLACED, form=()), 'part "block": datum A: no tolerance of form'),
+    "form that is stated alone": (block(PLACED, form=(tc.Flatness(0.01, form=None),)), None),
     "forgotten": (block(tc.Flatness(0.1), tc.Profile(0.3, "A|B|C"), side=(SQUARE,)), None),
     "targets": (targeted(SQUARE), None),
     "targets, square datum": (targeted(), 'feature "face B" .*limits tilt z to the datums before B'),
@@ -158,6 +159,7 @@ def test_drawings_are_checked_before_anything_is_located_or_measured(tmp_path):
     assert 'features "cylinder 3", "cylinder 4": no geometric tolerance limits its place in the part' in remarks[0]
     assert [re.sub(r" \(part.py:\d+\)", "", line) for line in written.stdout.splitlines()] == remarks
     assert read.returncode == 0 and written.returncode == 2 and "it measures nothing" in written.stderr
+    assert "with the option --drawing alone" in call(tmp_path, "check", "cover.stp").stderr
     (tmp_path / "plain.stp").write_text(COVER.read_text())
     assert '"plain.stp" is not an AP242 file' in call(tmp_path, "check", "plain.stp", "--drawing").stderr
 

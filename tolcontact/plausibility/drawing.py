@@ -78,7 +78,8 @@ def perfect_datums(nominal: Nominal) -> Iterator[Remark]:
         flat = [
             str(pattern.declared.datum)
             for pattern in _stated(nominal)
-            if pattern.declared.part is part.part and pattern.declared.datum and pattern.form is None
+            if pattern.declared.part is part.part and pattern.declared.datum
+            and not all(any(one.limits_form_alone for one in member.geometric) for member in pattern.declared.members)
             and isinstance(pattern.geometries[0], PlaneFeature) and not isinstance(pattern.geometries[0], FeatureOfSize)
         ]  # fmt: skip
         if flat:
