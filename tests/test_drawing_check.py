@@ -36,6 +36,30 @@ def turned_about() -> tc.Assembly:
     return a
 
 
+def targeted(*of_side) -> tc.Assembly:
+    """A block whose datums touch it at targets."""
+    a = tc.Assembly("block")
+    b = a.part("block", tc.Box(100, 50, 10), fixed=True)
+    faces = {"A": ("-z", ()), "B": ("-y", of_side), "C": ("-x", (tc.Perpendicularity(0.1, "A|B"),))}
+    points = {"A": [(5, 5, 0), (95, 5, 0), (50, 45, 0)], "B": [(5, 0, 5), (95, 0, 5)], "C": [(0, 25, 5)]}
+    for letter, (side, tolerances) in faces.items():
+        feature = b.feature(f"face {letter}", b.face(side), FLAT, *tolerances)
+        b.datum_targets(letter, *(feature.point(*point) for point in points[letter]))
+    a.measure("x", b.feature("far", b.face("+x"), PLACED).point(100, 25, 5), along="x")
+    return a
+
+
+def on_two_pads(*of_second) -> tc.Assembly:
+    """A block with a common datum of two pads."""
+    a = tc.Assembly("pads")
+    b = a.part("block", tc.Box(100, 50, 10), fixed=True)
+    pads = {"A": ((0, 0, -1), (30, 50, 1), ()), "B": ((60, 0, -1), (100, 50, 1), of_second)}
+    for letter, (lower, upper, tolerances) in pads.items():
+        b.feature(f"pad {letter}", b.face("-z", tc.select.Inside(lower, upper)), FLAT, *tolerances, datum=letter)
+    a.measure("z", b.feature("top", b.face("+z"), tc.Profile(0.2, "A-B")).point(50, 25, 10), along="z")
+    return a
+
+
 def drilled(*tolerances, standard="") -> tc.Assembly:
     """A plate with two holes, located on A and B alone, along x nothing locks."""
     _, plate, faces = plate_with_holes(2)
@@ -89,7 +113,13 @@ DRAWINGS = {
     "each datum first once": (turned_about(), None),
     "location": (block(tc.Perpendicularity(0.2, "A|B|C")), 'feature "far" .*limits offset: .*add tc.Position or tc.Profile'),
     "rough seat": (block(PLACED, form=()), 'part "block": datum A: no tolerance of form'),
+    "form that is stated alone": (block(PLACED, form=(tc.Flatness(0.01, form=None),)), None),
     "forgotten": (block(tc.Flatness(0.1), tc.Profile(0.3, "A|B|C"), side=(SQUARE,)), None),
+    "targets": (targeted(SQUARE), None),
+    "targets, square datum": (targeted(), 'feature "face B" .*limits tilt z to the datums before B'),
+    "common datum": (on_two_pads(), 'feature "pad B" .*limits offset, tilt x, tilt y to the datums before B'),
+    "common datum, square": (on_two_pads(tc.Profile(0.1, "A")), None),
+    "lower segment alone": (drilled(tc.Size(8, 0.1), tc.Position(0.1, "A><|B><")), "common shift x, .*add tc.Position or"),
     "open": (drilled(*SIZED), "H.*no tolerance limits common shift x"),
     "open, separate": (drilled(*SIZED, standard="ISO"), "H.*no tolerance limits shift x, shift x"),
     "exact, with a profile": (drilled(tc.Profile(0.2, "A|B")), "H.*exactly 8 mm, although its profile limits the size, too"),
@@ -129,6 +159,7 @@ def test_drawings_are_checked_before_anything_is_located_or_measured(tmp_path):
     assert 'features "cylinder 3", "cylinder 4": no geometric tolerance limits its place in the part' in remarks[0]
     assert [re.sub(r" \(part.py:\d+\)", "", line) for line in written.stdout.splitlines()] == remarks
     assert read.returncode == 0 and written.returncode == 2 and "it measures nothing" in written.stderr
+    assert "with the option --drawing alone" in call(tmp_path, "check", "cover.stp").stderr
     (tmp_path / "plain.stp").write_text(COVER.read_text())
     assert '"plain.stp" is not an AP242 file' in call(tmp_path, "check", "plain.stp", "--drawing").stderr
 

@@ -173,7 +173,7 @@ def doors():
     model.contact("left foot", moving=foot, reference=seat)
     model.contact("seal", moving=door.face("-y"), reference=body.face("+z"))
     model.force("weight", at=door.point(15, 2, 20), vector=(1, 2, -30))
-    model.may_overlap(door, hinge)
+    model.may_overlap(door, hinge, body)
     return model, hinge, door
 
 

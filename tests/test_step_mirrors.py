@@ -94,3 +94,23 @@ def test_operators_that_scale_or_lack_parameters_are_refused(path, tmp_path):
         changed.write_text(text.replace(first, first.replace(old, new)))
         with pytest.raises(ModelError, match=fault):
             tc.io.parts_from(tc.Assembly("wedges"), changed)
+
+
+def test_axes_that_an_operator_leaves_out_are_square_to_the_others(tmp_path):
+    made, path = Step(), tmp_path / "axes.step"
+    wedge, whole = made.product("wedge", [made.wedge()]), made.product("whole")
+    start, x, y, z = f"#{made.point((0, 0, 0))}", *(f"#{made.direction(axis)}" for axis in np.eye(3))
+
+    def place(name, *axes):
+        operator = made.add("CARTESIAN_TRANSFORMATION_OPERATOR_3D('','','',{},{},{},$,{})".format(*axes))
+        made.place(wedge, whole, name, operator=operator)
+        path.write_text(str(made))
+
+    place("x along y", y, "$", start, z)
+    place("z along x", "$", "$", start, x)
+    boxes = [(body.lower, body.upper) for body in tc.io.bodies_in(path)]
+    expected = [((-20, 0, 0), (0, 40, 10)), ((0, 0, 0), (10, 40, 20))]
+    np.testing.assert_allclose(boxes, expected, atol=1e-6)
+    place("parallel", x, y, start, x)
+    with pytest.raises(ModelError, match="has parallel axes"):
+        tc.io.parts_from(tc.Assembly("axes"), path)

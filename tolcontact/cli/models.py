@@ -78,8 +78,8 @@ def check(
     assembly, doubts = None, list[warnings.WarningMessage]()
     try:
         with waiting(f"checking {model}"), warnings.catch_warnings(record=True) as doubts:
-            if drawing and model.suffix.lower() in STEP:
-                _check_annotations(model)
+            if model.suffix.lower() in STEP:
+                _check_annotations(model, is_asked=drawing and not view)
                 return
             assembly = load_model(model)
             program = build(assembly, solver=solver, method=common.method_choices(resolution=resolution, objective=objective))
@@ -113,13 +113,17 @@ def check(
     common.echo(f"no faults found{count}")
 
 
-def _check_annotations(file: Path) -> None:
+def _check_annotations(file: Path, *, is_asked: bool) -> None:
     """Print what the tolerances of a STEP file leave open, and those among them that no feature states."""
+    if not is_asked:
+        raise OptionError(f'"{file}" is a STEP file; its tolerances are checked with the option --drawing alone')
     information = read_pmi(file)
     if information.is_empty:
         raise OptionError(without_annotations(information, file))
     declared = declared_file(file, information)
     common.echo(declared)
+    if any(entry.reason for entry in declared.annotations):
+        common.echo("drawing: what is not declared does not count here; it may limit what is said to be open")
     _print_remarks(discretize(declared.assembly, incomplete=True))
 
 

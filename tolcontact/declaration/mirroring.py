@@ -7,7 +7,7 @@ from typing import Any, Literal, overload
 from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration.causes import Causes
-from tolcontact.declaration.contact_pair import ContactPair, Force, Overlap
+from tolcontact.declaration.contact_pair import MIN_PARTS, ContactPair, Force, Overlap
 from tolcontact.declaration.declarations import expect
 from tolcontact.declaration.elastic import Elastic
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
@@ -101,11 +101,15 @@ class MirrorPlane:
             is_on_image = not isinstance(location.on, Feature) or location.on in self.features
             if location.part in self.parts and is_on_image and not location.joint:
                 yield "locations", self.composed(location)
-        for name, kind in (("pairs", ContactPair), ("forces", Force), ("overlaps", Overlap)):
+        for name, kind in (("pairs", ContactPair), ("forces", Force)):
             for thing in declared[name]:
                 parts = (thing.moving.part, thing.reference.part) if kind is ContactPair else thing.parts
                 if all(part in self.parts for part in parts):
                     yield name, self.composed(thing)
+        for overlap in declared["overlaps"]:
+            parts = tuple(part for part in overlap.parts if part in self.parts)
+            if len(parts) >= MIN_PARTS:
+                yield "overlaps", self.composed(replace(overlap, parts=parts))
 
 
 class Mirroring(Causes):
@@ -127,7 +131,7 @@ class Mirroring(Causes):
 
         Features, datums, tolerances, forms and elasticity of the parts come with them, and so do their locators on the ground,
         on a part, or on a feature that is mirrored, too; forces on them; contact pairs and meant overlaps between them. Contact
-        with other parts, measures, joints, and causes of deviations do not.
+        with other parts, measures, joints, and causes of deviations do not, and neither does what is declared later.
         Coordinates, directions and faces in the frame of an image are the same as in the frame of its part; the mirror makes
         this frame left-handed. Images have draws of their own; equal deviations give mirrored parts.
         Raises ValueError or TypeError for wrong arguments.

@@ -57,10 +57,12 @@ def _motion(operator: Any) -> np.ndarray:
 def _axes(operator: Any) -> np.ndarray:
     """Return the directions of the three axes of an operator as columns (3, 3)."""
     z = _stated(operator.Axis3(), np.array([0.0, 0.0, 1.0]))
-    x = _stated(operator.Axis1(), np.array([1.0, 0.0, 0.0]))
+    x = _stated(operator.Axis1(), np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 1 - CLOSE else np.array([0.0, 1.0, 0.0]))
     x = _unit(x - (x @ z) * z)
     y = _stated(operator.Axis2(), np.array([0.0, 1.0, 0.0]))
-    return np.column_stack([x, _unit(y - (y @ z) * z - (y @ x) * x), z])
+    y = y - (y @ z) * z - (y @ x) * x
+    is_left_out = operator.Axis2() is None and np.linalg.norm(y) < CLOSE  # for the norm it would then have no direction
+    return np.column_stack([x, np.cross(z, x) if is_left_out else _unit(y), z])
 
 
 def _stated(direction: Any, default: np.ndarray) -> np.ndarray:
@@ -68,7 +70,12 @@ def _stated(direction: Any, default: np.ndarray) -> np.ndarray:
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)
+    length = np.linalg.norm(vector)
+    if length < CLOSE:
+        raise Refusal(
+            "is damaged: a CARTESIAN_TRANSFORMATION_OPERATOR_3D has parallel axes, or one of length 0; export it again"
+        )
+    return np.asarray(vector / length)
 
 
 def _direction(axis: np.ndarray) -> Any:

@@ -12,8 +12,9 @@ from tolcontact.discretization import Nominal
 from tolcontact.features import FeatureOfSize, NominalFeature, NominalPattern, PlaneFeature, datum_frame, uncontrolled
 
 LISTED = 6  # freedoms or faces by name
+LOCATED = "tc.Position or tc.Profile to datums that lock it"
 ADVICE = {
-    "offset": "tc.Position or tc.Profile to datums that lock it", "shift": "tc.Position to datums that lock it",
+    "offset": LOCATED, "shift": "tc.Position to datums that lock it", "common": LOCATED, "mixed": LOCATED,
     "tilt": "tc.Perpendicularity, tc.Parallelism or tc.Angularity, or a location",
     "relative": "a tolerance with combined zones",
 }  # fmt: skip
@@ -47,14 +48,17 @@ def open_freedoms(nominal: Nominal) -> Iterator[Remark]:
         names = uncontrolled(pattern, _followed(nominal, pattern))
         if not names:
             continue
-        declared, datum = pattern.declared, pattern.declared.datum
+        declared, datum = pattern.declared, _letter(pattern)
         if not declared.geometric and datum is None:
             yield _remark(pattern, "no geometric tolerance limits its place in the part: taken as perfect")
             continue
         earlier = f" to the datums before {datum}" if datum else ""
         kinds = dict.fromkeys(name.split()[0] for name in names)
-        advice = "; ".join(ADVICE[kind] for kind in kinds if kind in ADVICE) or ADVICE["relative"]
-        yield _remark(pattern, f"no tolerance limits {_listed(names)}{earlier}: taken as perfect; add {advice}")
+        advice = "; ".join(dict.fromkeys(ADVICE[kind] for kind in kinds if kind in ADVICE)) or ADVICE["relative"]
+        own = [name.replace("mixed", "a combination of its freedoms") for name in names if name != "relative"]
+        members = ["its members to each other"] if len(own) < len(names) else []
+        limited = _listed([*members, *own]) + (earlier if own else "")
+        yield _remark(pattern, f"no tolerance limits {limited}: taken as perfect; add {advice}")
 
 
 def missing_sizes(nominal: Nominal) -> Iterator[Remark]:
@@ -74,7 +78,8 @@ def perfect_datums(nominal: Nominal) -> Iterator[Remark]:
         flat = [
             str(pattern.declared.datum)
             for pattern in _stated(nominal)
-            if pattern.declared.part is part.part and pattern.declared.datum and pattern.form is None
+            if pattern.declared.part is part.part and pattern.declared.datum
+            and not all(any(one.limits_form_alone for one in member.geometric) for member in pattern.declared.members)
             and isinstance(pattern.geometries[0], PlaneFeature) and not isinstance(pattern.geometries[0], FeatureOfSize)
         ]  # fmt: skip
         if flat:
@@ -86,6 +91,7 @@ def unused_datums(nominal: Nominal) -> Iterator[Remark]:
     for part in nominal.last_parts:
         used = {letter for declared in part.part.toleranced for tolerance in declared.geometric for letter in tolerance.letters}
         letters = [declared.datum for declared in part.part.toleranced if declared.datum]
+        letters += [targets.letter for targets in part.part.targets]
         if idle := [letter for letter in letters if letter not in used]:
             yield Remark("no tolerance refers to it; refer to it, or leave the letter out", part.name, "datum", _listed(idle))
 
@@ -132,9 +138,9 @@ def _stated(nominal: Nominal) -> list[NominalPattern]:
 def _followed(nominal: Nominal, pattern: NominalPattern) -> np.ndarray:
     """Return the directions (coordinate, n) of a datum that its frame follows: what the datums before it leave free.
 
-    Datums whose own tolerances refer to it are left out: these limit them to it.
+    Datums whose own tolerances refer to it are left out: these limit them to it. Of a common datum the earlier letters count.
     """
-    datums, letter = nominal.datums(pattern.part), pattern.declared.datum
+    datums, letter = nominal.datums(pattern.part), _letter(pattern)
     if not letter:
         return np.zeros((pattern.count, 0))
     stated = [(declared.datum, one) for declared in pattern.declared.part.toleranced for one in declared.geometric]
@@ -142,8 +148,10 @@ def _followed(nominal: Nominal, pattern: NominalPattern) -> np.ndarray:
     before = [
         [
             (letters, orientation_only)
-            for letters, orientation_only in zip(tolerance.system[:k], tolerance.orientation_only, strict=False)
-            if not following & {*letters}
+            for letters, orientation_only in zip(
+                (*tolerance.system[:k], named[: named.index(letter)]), tolerance.orientation_only, strict=False
+            )
+            if letters and not following & {*letters}
         ]
         for _, tolerance in stated
         for k, named in enumerate(tolerance.system)
@@ -155,6 +163,13 @@ def _followed(nominal: Nominal, pattern: NominalPattern) -> np.ndarray:
     system, orientation_only = zip(*places, strict=True)
     frame = datum_frame(_features(system, datums), pattern.centre, pattern.reach, len(nominal.contributors), orientation_only)
     return pattern.values @ frame.free
+
+
+def _letter(pattern: NominalPattern) -> str | None:
+    """Return the letter of the datum that a feature or pattern is, or has targets of; None if it is no datum."""
+    declared = pattern.declared
+    targeted = (targets.letter for targets in declared.part.targets if {*targets.features} & {*declared.members})
+    return declared.datum or next(targeted, None)
 
 
 def _features(
