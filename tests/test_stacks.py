@@ -266,6 +266,7 @@ def test_measured_links_of_a_table_have_the_intervals_of_their_parts(tmp_path):
         ("name,nominal,mean,sd,parts\nA,1,1.01,0.02,30.5\n", "row 2: parts is 30.5; expected a whole number, 5 or more"),
         ("name,nominal,mean,sd\nA,1,1.01,0\n", "row 2: sd is 0; expected a standard deviation above 0"),
         ("name,nominal,tolerance,parts\nA,1,0.1,30\n", "row 2: mean and sd are empty"),
+        ("name,nominal,mean,sd\nA,1,,\n", "row 2: mean and sd are empty"),
     ],
 )  # fmt: skip
 def test_a_fault_of_a_table_is_one_message(text, message, tmp_path):
