@@ -231,6 +231,7 @@ def test_measured_links_of_a_table_have_the_intervals_of_their_parts(tmp_path):
     scripted.link("groove", 52.1, "±0.04")
     scripted.link("washer", 12, tc.Tolerance(distribution=stats.norm(-0.018, 0.0075), parts=30), sensitivity=-1)
     scripted.link("rod", 40, tc.Tolerance(distribution=stats.norm(0.01, 0.008)), sensitivity=-1)
+    assert str(scripted.variables[-1]) == "variable rod [mm]: mean 0.01, standard deviation 0.008 mm"
     summaries = []
     for model in (stack, scripted):
         model.gap("play")

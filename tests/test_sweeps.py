@@ -91,7 +91,9 @@ def test_a_script_is_swept_by_the_command_line(tmp_path):
     data = json.loads(call(tmp_path, "sweep", "arm.py", "--over", "angle=0,0.5,1", "--samples", 200, "--json").stdout)
     assert data["dims"]["position"] == 3
     failed = call(tmp_path, "sweep", "arm.py", "--over", "angel=0,1", "--samples", 20)
-    assert failed.returncode == 2 and "angel" in failed.stderr
+    assert failed.returncode == 2 and ": assembly(angle) got an unexpected keyword argument 'angel'" in failed.stderr
+    failed = call(tmp_path, "sweep", "arm.py", "--over", "angle=0,1", "--over", "angle=2,3", "--samples", 20)
+    assert failed.returncode == 2 and '--over has "angle" 2 times; give all its values at once' in failed.stderr
     failed = call(tmp_path, "sweep", "arm.py", "--over", "angle=fast", "--samples", 20)
     assert failed.returncode == 2 and "expected --over angle=0:1.5:7 (from, to, number)" in failed.stderr
 

@@ -30,7 +30,7 @@ class Causes(Declarations):
         """Declare a cause that drives several contributors or expands parts, or a dimension that chains measure (see Variable).
 
         name        of the cause
-        tolerance   full width of its range in its `units`, or a tc.Tolerance
+        tolerance   full width of its range in its `units`, a text such as "±5 K", or a tc.Tolerance
         drives      factor [mm per unit] of each contributor, by its label
         units       of the cause, by default mm
         nominal     value of a dimension in its `units`, which may drive nothing
