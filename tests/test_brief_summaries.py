@@ -2,6 +2,7 @@
 
 import io
 
+import casadi as ca
 import pytest
 from rich.console import Console
 
@@ -53,6 +54,17 @@ def test_many_measurements_are_shortened_to_those_that_fall_short(tmp_path):
     assert "kurtosis" in printed(summary.isel(measure=slice(3)))[0]
     outputs = [call(tmp_path, "summary", "gaps.nc", *options).stdout for options in ([], ["--all"])]
     assert ["kurtosis" in output for output in outputs] == [False, True]
+
+
+def test_undecided_measurements_and_those_that_are_no_numbers_are_not_hidden():
+    """Twenty realizations leave six of the gaps undecided; the root of a negative height is no number."""
+    assert "2 more undecided, 1 more without limits; " in printed(tc.summarize(tc.run(many_gaps(), samples=20, seed=1)))[1]
+    a = many_parts()
+    for k in range(COUNT):
+        a.measure(f"place {k}", a.parts[1].point(k, 0, 0), along="z")
+    a.measure("root", lambda poses: ca.sqrt(poses.position(a.parts[1].point(5, 5, 10))[0] - 5))
+    text = printed(tc.summarize(tc.run(a, samples=20, seed=1)))[1]
+    assert "root: not a number" in text and "place 0" not in text and f"{COUNT + 1} more without limits" in text
 
 
 @pytest.mark.parametrize("width", [100, 80])

@@ -180,6 +180,20 @@ def test_faces_that_were_not_chosen_are_named():
     assert 'moving=block.face("-x"), reference=base.face("+x")' in text
 
 
+def test_a_block_that_sinks_into_its_base_on_springs_is_named_without_a_pair():
+    a = tc.Assembly("press", method=tc.Method(objective="seating"))
+    base, block = a.part("base", tc.Box(40, 40, 10), fixed=True), a.part("block", tc.Box(20, 20, 10), at=(10, 10, 10))
+    feet = [
+        tc.Locator(f"A{k}", p, "z", one_sided=True, stiffness=1000) for k, p in enumerate([(2, 2, 0), (18, 2, 0), (10, 18, 0)])
+    ]
+    sides = [tc.Locator("B1", (2, 0, 5), "y"), tc.Locator("B2", (18, 0, 5), "y"), tc.Locator("C", (0, 10, 5), "x")]
+    a.locate(block, [*feet, *sides], tolerance=0.01, on=base)
+    a.force("press", at=block.point(10, 10, 10), vector=(0, 0, -300))
+    a.measure("height", block.point(10, 10, 10), along="z")
+    (text,) = warned(a)
+    assert re.match(r'\[clash\] part "block" .*part "block" still lies in part "base" beyond the supports in all', text)
+
+
 def test_answers_beyond_the_chosen_faces_are_doubtful_and_say_why():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", tc.NominalWarning)

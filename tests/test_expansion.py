@@ -133,8 +133,10 @@ def test_what_cannot_expand_is_refused_by_name():
     a.parts[0].elastic(E=70e3, nu=0.33)
     a.variable("warmth", 20, units="K", expands={"plate": 12e-6, "hgih": 1e-6})
     a.variable("heat", 20, units="K", expands={"low": 12})
+    a.variable("length", 20, expands={"low": 12e-6})
     faults = "\n".join(tc.check(a))
     assert 'expands has "low": 12; expected a coefficient of expansion in 1/K' in faults
+    assert 'units is "mm", and a temperature expands parts; give units="K"' in faults
     a = tower()
     a.parts[1].elastic(E=70e3, nu=0.33)
     a.variable("warmth", 20, units="K", expands={"low": 12e-6, "hgih": 1e-6})

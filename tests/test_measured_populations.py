@@ -68,6 +68,18 @@ def test_a_gauge_coarser_than_the_parts_is_refused():
     assert "gauge is larger than the spread of some combination of the columns" in tc.check(a)[0]
     with pytest.raises(ValueError, match=r'gauge has "top.A3"; its contributors are: top.A1, top.A2'):
         a.population(correlated(), FEET, gauge={"top.A3": 0.01})
+    for gauge in ({"top.A1": "0.01"}, {"top.A1": None}, float("nan")):
+        with pytest.raises(ValueError, match=r"gauge is .*; expected a standard uncertainty, or one for each label"):
+            a.population(correlated(), FEET, gauge=gauge)
+    assert a.population(correlated(), FEET, gauge=np.float32(0.01)).gauge == pytest.approx((0.01, 0.01))
+
+
+@pytest.mark.parametrize("gauge", [0.1, {"top.A1": 0.1}])
+def test_columns_without_a_spread_of_their_own_leave_none_to_a_gauge(gauge):
+    """Of two proportional columns, or of as many rows as columns, some combination has no variance to take off."""
+    a = cases.ra1()
+    a.population({"one": [1.0, 2.0, 3.0, 4.0], "two": [2.0, 4.0, 6.0, 8.0]}, FEET, gauge=gauge)
+    assert "of some combination of the columns, which correlate more than its scatter allows" in tc.check(a)[0]
 
 
 def test_realizations_draw_a_lot_and_then_a_part_of_it():
@@ -129,12 +141,24 @@ def test_rows_with_gaps_are_refused_or_left_out_as_a_whole(kind, tmp_path):
     population = a.population(source, FEET, gaps="left out")
     assert population.values.tolist() == [[0.1, 1.0], [0.4, 4.0]] and population.left_out == 2
     assert "2 of 4 rows had gaps and are left out" in population.in_words
+    texts = a.population({"one": ["0.1", " ", "0.3"], "two": ["1", "2", "3"]}, FEET, gaps="left out")
+    assert texts.values.tolist() == [[0.1, 1.0], [0.3, 3.0]]
+    b = cases.ra1()
+    b.population(table, FEET)
+    assert 'gaps="left out" leaves out rows with empty cells' in tc.check(b)[0]
     with pytest.raises(ValueError, match="gaps is 'ignored'; expected one of: refused, left out"):
         a.population(source, FEET, gaps="ignored")
     with pytest.raises(ValueError, match="each of its 4 rows has a gap"):
         a.population(table.assign(one=np.nan), FEET, gaps="left out")
     with pytest.raises(ValueError, match=r"(line 3|row 2) has no lot; name it"):
         a.population(source, {"top.A1": "three"}, lots="one", gaps="left out")
+
+
+def test_a_column_of_lots_is_named_as_in_the_heading_and_is_no_contributor():
+    a, table = cases.ra1(), {"top.A1": [0.1, 0.2, 0.3, 0.4], "lot (no)": list("AABB")}
+    assert [a.population(table, lots=name).columns for name in ("lot (no)", "lot")] == [("top.A1",)] * 2
+    with pytest.raises(TypeError, match="lots is a list; expected the name of a column"):
+        a.population(table, lots=list("AABB"))
 
 
 def test_a_column_of_names_is_left_out_by_those_that_are_read(tmp_path):

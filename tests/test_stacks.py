@@ -231,6 +231,7 @@ def test_measured_links_of_a_table_have_the_intervals_of_their_parts(tmp_path):
     scripted.link("groove", 52.1, "±0.04")
     scripted.link("washer", 12, tc.Tolerance(distribution=stats.norm(-0.018, 0.0075), parts=30), sensitivity=-1)
     scripted.link("rod", 40, tc.Tolerance(distribution=stats.norm(0.01, 0.008)), sensitivity=-1)
+    assert str(scripted.variables[-1]) == "variable rod [mm]: mean 0.01, standard deviation 0.008 mm"
     summaries = []
     for model in (stack, scripted):
         model.gap("play")
@@ -266,6 +267,7 @@ def test_measured_links_of_a_table_have_the_intervals_of_their_parts(tmp_path):
         ("name,nominal,mean,sd,parts\nA,1,1.01,0.02,30.5\n", "row 2: parts is 30.5; expected a whole number, 5 or more"),
         ("name,nominal,mean,sd\nA,1,1.01,0\n", "row 2: sd is 0; expected a standard deviation above 0"),
         ("name,nominal,tolerance,parts\nA,1,0.1,30\n", "row 2: mean and sd are empty"),
+        ("name,nominal,mean,sd\nA,1,,\n", "row 2: mean and sd are empty"),
     ],
 )  # fmt: skip
 def test_a_fault_of_a_table_is_one_message(text, message, tmp_path):

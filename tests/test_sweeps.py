@@ -91,7 +91,9 @@ def test_a_script_is_swept_by_the_command_line(tmp_path):
     data = json.loads(call(tmp_path, "sweep", "arm.py", "--over", "angle=0,0.5,1", "--samples", 200, "--json").stdout)
     assert data["dims"]["position"] == 3
     failed = call(tmp_path, "sweep", "arm.py", "--over", "angel=0,1", "--samples", 20)
-    assert failed.returncode == 2 and "angel" in failed.stderr
+    assert failed.returncode == 2 and ": assembly(angle) got an unexpected keyword argument 'angel'" in failed.stderr
+    failed = call(tmp_path, "sweep", "arm.py", "--over", "angle=0,1", "--over", "angle=2,3", "--samples", 20)
+    assert failed.returncode == 2 and '--over has "angle" 2 times; give all its values at once' in failed.stderr
     failed = call(tmp_path, "sweep", "arm.py", "--over", "angle=fast", "--samples", 20)
     assert failed.returncode == 2 and "expected --over angle=0:1.5:7 (from, to, number)" in failed.stderr
 
@@ -101,6 +103,7 @@ def test_a_script_is_swept_by_the_command_line(tmp_path):
     [
         (arm, {"angle": [0.0]}, "over has values: 1 of angle; expected two or more"),
         (arm, {"angle": [0, 1], "slide": [0]}, "2 of angle, 1 of slide; expected two or more, and equally many"),
+        (arm, {"angel": [0, 1]}, r"over does not fit the model: arm\(angle\) got an unexpected keyword argument 'angel'"),
         (arm, {"angle": ["fast", 1]}, "expected values of each parameter"),
         (arm(), {"angle": [0, 1]}, "the model is a Assembly; expected a function of angle"),
         ("arm.nc", {"angle": [0, 1]}, "holds the model at one position"),
@@ -117,8 +120,15 @@ def test_positions_with_other_contributors_are_refused():
         model.variable("play", 0.1, nominal=0.0) if angle else None
         return model
 
+    def in_other_units(angle):
+        model = arm(angle)
+        model.measure("tip", model.parts[0].point(0, 0, 0), along="x", units="in" if angle else "mm")
+        return model
+
     with pytest.raises(tc.OptionError, match=r"at angle=1 the contributors are others .*, such as play"):
         tc.analyses.sweep(other, {"angle": [0, 1]}, samples=10)
+    with pytest.raises(tc.OptionError, match=r"at angle=1 the measurements are others .*, such as tip \[in\]"):
+        tc.analyses.sweep(in_other_units, {"angle": [0, 1]}, samples=10)
 
 
 def test_a_mechanism_that_cannot_be_assembled_at_a_position_is_outside_there():

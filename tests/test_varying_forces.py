@@ -84,3 +84,15 @@ def test_forces_that_cannot_vary_are_refused_by_name():
     a.parts[0].elastic(E=70e3, nu=0.33)
     a.force("press", at=point, vector=(0, 0, -100), tolerance=10)
     assert any('it loads force "press", and part "pad 0" is elastic' in fault for fault in tc.check(a))
+    for option in ("drives", "expands", "loads"):
+        with pytest.raises(TypeError, match=f'variable "warmth": {option} is a list; expected a factor for each name'):
+            a.variable("warmth", 30, units="K", **{option: ["press"]})
+
+
+def test_a_tolerance_as_text_is_in_the_units_of_its_variable():
+    a, point = pads(1)
+    a.force("press", at=point, vector=(0, 0, -100), tolerance="+20/-10 N")
+    a.variable("play", "±0.254 mm", units="in", nominal=1.0)
+    assert [(v.tolerance.range, v.tolerance.shift) for v in a.variables] == [(30, 5), (pytest.approx(0.02), 0)]
+    with pytest.raises(ValueError, match=r'variable "heat": tolerance is .±0.1 in.; its unit is in; expected K'):
+        a.variable("heat", "±0.1 in", units="K", expands={a.parts[0]: 1e-5})

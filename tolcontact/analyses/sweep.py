@@ -13,7 +13,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis, Progress
 from tolcontact.declaration import Assembly
-from tolcontact.declaration.script import load_model
+from tolcontact.declaration.script import load_model, parameter_fault
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.method import Solver
@@ -115,6 +115,8 @@ def _at(model: Mechanism, point: Mapping[str, float]) -> Callable[[], Assembly]:
             f"the model is a {type(model).__name__}; expected a function of {', '.join(point)} that returns a tc.Assembly, "
             "or the path of a script with one"
         )
+    if fault := parameter_fault(model, point):
+        raise OptionError(f"over does not fit the model: {fault}")
     return partial(model, **point)
 
 
@@ -122,7 +124,9 @@ def _check_same(analyses: Sequence[Analysis], points: Sequence[Mapping[str, floa
     """Raise OptionError unless the contributors and the measures are the same at all positions."""
     names = {
         "contributors": [analysis.program.draws.labels for analysis in analyses],
-        "measurements": [[measure.name for measure in analysis.program.nominal.measures] for analysis in analyses],
+        "measurements": [
+            [f"{measure.name} [{measure.units}]" for measure in analysis.program.nominal.measures] for analysis in analyses
+        ],
     }
     for kind, names_at in names.items():
         for point, actual in zip(points, names_at, strict=True):

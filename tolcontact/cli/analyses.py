@@ -1,5 +1,6 @@
 """The commands of all analyses: one table, for the list of commands and for their options."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
@@ -101,12 +102,18 @@ def _corner(text: str, option: str) -> tuple[float, ...]:
 
 def _with_points(options: dict[str, Any]) -> dict[str, Any]:
     """Return the arguments of `sweep`."""
-    return options | {"over": dict(map(_values, options["over"]))}
+    values = [_values(text) for text in options["over"]]
+    for name, count in Counter(name for name, _ in values).items():
+        if count > 1:
+            raise OptionError(f'--over has "{name}" {count} times; give all its values at once, as in --over {name}=0,0.5,1')
+    return options | {"over": dict(values)}
 
 
 def _values(text: str) -> tuple[str, list[float]]:
     name, _, value = text.partition("=")
     try:
+        if not name:
+            raise ValueError
         if ":" not in value:
             return name, [float(number) for number in value.split(",")]
         first, last, count = value.split(":")

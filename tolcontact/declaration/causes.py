@@ -16,6 +16,7 @@ from tolcontact.declaration.part import Part
 from tolcontact.declaration.population import Population
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import script_line
+from tolcontact.declaration.written_tolerance import TextFault, written
 
 
 class Causes(Declarations):
@@ -29,7 +30,7 @@ class Causes(Declarations):
         """Declare a cause that drives several contributors or expands parts, or a dimension that chains measure (see Variable).
 
         name        of the cause
-        tolerance   full width of its range in its `units`, or a tc.Tolerance
+        tolerance   full width of its range in its `units`, a text such as "±5 K", or a tc.Tolerance
         drives      factor [mm per unit] of each contributor, by its label
         units       of the cause, by default mm
         nominal     value of a dimension in its `units`, which may drive nothing
@@ -39,6 +40,13 @@ class Causes(Declarations):
 
         `model.variable("warmth", 20, drives={"cover.width.size": 0.0007}, units="K")`
         """
+        for option, factors in (("drives", drives), ("expands", expands), ("loads", loads)):
+            expect(f'variable "{name}": {option}', factors, Mapping | None, f'a factor for each name: {option}={{"name": 0.1}}')
+        if isinstance(tolerance, str) and isinstance(units, str) and units != "mm":
+            try:
+                tolerance = written(tolerance, units=units)
+            except TextFault as fault:
+                raise ValueError(f'variable "{name}": tolerance is {tolerance!r}; {fault}') from fault
         by_name = {part.name if isinstance(part, Part) else part: alpha for part, alpha in (expands or {}).items()}
         variable = Variable(
             name=name, tolerance=_tolerance(tolerance), drives=dict(drives or {}), units=units, nominal=nominal,
@@ -78,7 +86,7 @@ class Causes(Declarations):
             for feature in self.assembly.features
             if feature.size
         }
-        expect("population: gauge", gauge, int | float | Mapping, "a standard uncertainty, or one for each label")
+        expect("population: lots", lots, str | None, "the name of a column")
         table = _population(
             source, columns, script_line(), units=units, sizes=sizes if absolute else None, gauge=gauge, lots=lots, gaps=gaps
         )

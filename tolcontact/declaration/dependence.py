@@ -61,6 +61,8 @@ class Variable(Declaration):
                 yield f"drives has {label!r}: {factor!r}; expected the label of a contributor, and a number"
         if not (self.units and is_line(self.units)):
             yield f'units is {self.units!r}; expected a text such as "mm" or "K"'
+        elif self.expands and self.units in UNITS:
+            yield f'units is "{self.units}", and a temperature expands parts; give units="K"'
         elif self.drives and self.units in UNITS and self.units != "mm":
             yield (
                 f'units is "{self.units}", and nothing is converted; state the cause in mm: its tolerance times '

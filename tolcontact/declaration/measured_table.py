@@ -10,6 +10,7 @@ import numpy as np
 
 from tolcontact.declaration.geometry import UNITS
 from tolcontact.declaration.population import Population
+from tolcontact.declaration.values import is_length
 from tolcontact.tables import number, read_table
 from tolcontact.texts import shown
 
@@ -53,8 +54,11 @@ def population(
         values = values - nominal
     if isinstance(gauge, Mapping) and (unknown := [label for label in gauge if label not in labels]):
         raise ValueError(f'population "{title}": gauge has "{unknown[0]}"; its contributors are: {", ".join(labels)}')
+    stated_gauge = gauge.values() if isinstance(gauge, Mapping) else [gauge]
+    if wrong := [u for u in stated_gauge if not is_length(u)]:
+        raise ValueError(f'population "{title}": gauge is {wrong[0]!r}; expected a standard uncertainty, or one for each label')
     uncertainties = [gauge.get(label, 0.0) for label in labels] if isinstance(gauge, Mapping) else [gauge] * len(labels)
-    stated = tuple(UNITS[units] * u for u in uncertainties) if any(uncertainties) else ()
+    stated = tuple(float(UNITS[units] * u) for u in uncertainties) if any(uncertainties) else ()
     left_out = int((~kept).sum())
     return Population(tuple(labels), values, title, declared_at, stated, tuple(map(str, row_lots)), left_out)
 
@@ -82,7 +86,7 @@ def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str, lots:
     title = f"of {len(table)} rows"
     labels, indices, lot_index = _columns(title, list(map(str, table.columns)), columns, units, lots)
     entries = [table.iloc[:, index].astype(object) for index in indices]
-    is_gap = [column.isna().to_numpy() for column in entries]
+    is_gap = [(column.isna() | column.map(_is_blank)).to_numpy(dtype=bool) for column in entries]
     entries = [column.mask(column.map(type).isin([bool, np.bool_])) for column in entries]
     numbers = [pd.to_numeric(column, errors="coerce").to_numpy(dtype=float) for column in entries]
     nothing = np.empty((len(table), 0))
@@ -94,6 +98,10 @@ def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str, lots:
         np.column_stack(is_gap) if is_gap else nothing.astype(bool),
         _lots(title, cells, range(1, len(table) + 1), "row"),
     )
+
+
+def _is_blank(cell: Any) -> bool:
+    return isinstance(cell, str) and not cell.strip()
 
 
 def _of_file(source: str | Path, columns: Mapping[str, str] | None, units: str, lots: str | None, gaps: Gaps) -> MeasuredTable:
@@ -148,7 +156,11 @@ def _columns(
     A heading may state its unit in brackets, which has to be `units`.
     """
     stated = [match.groups() if (match := _HEADING.fullmatch(name)) else (name, "") for name in heading]
-    labels = list(columns) if columns is not None else [name for name, _ in stated if name != lots]
+    labels = (
+        list(columns)
+        if columns is not None
+        else [name for (name, _), cell in zip(stated, heading, strict=True) if lots not in (name, cell)]
+    )
     names = list(map(str, labels if columns is None else columns.values()))
     indices = list[int]()
     for name in [*names, *([] if lots is None else [lots])]:

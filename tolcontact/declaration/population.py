@@ -50,7 +50,10 @@ class Population(Declaration):
         elif fault := self._gap():
             yield fault
         elif self.lots and (len(self.lots) != len(self.values) or len(set(self.lots)) < 2):
-            yield f"it has {len(set(self.lots))} lot(s) for {len(self.values)} rows; expected two or more, and one for each row"
+            yield (
+                f"it has {len(set(self.lots))} lot(s) for {len(self.values)} rows; expected two or more, and one for each row; "
+                "leave lots out if all parts are of one"
+            )
         elif self.gauge and not (len(self.gauge) == len(self.columns) and all(is_length(u) and u >= 0 for u in self.gauge)):
             yield f"gauge is {self.gauge!r}; expected a standard uncertainty of 0 or above for each column"
         else:
@@ -63,7 +66,8 @@ class Population(Declaration):
             return ""
         first = np.lexsort([rows, columns])[0]
         where = f"row {rows[first] + 1} of the column for {self.columns[columns[first]]}"
-        return f"{where} is no number up to {MAX_NUMBER:g}; mend it, or leave out the row"
+        remedy = 'mend it, or leave out the row; gaps="left out" leaves out rows with empty cells'
+        return f"{where} is no number up to {MAX_NUMBER:g}; {remedy}"
 
     def _gauge_faults(self) -> Iterator[str]:
         """Yield a sentence if the scatter of the gauge is larger than the spread of the measured values."""
@@ -80,7 +84,7 @@ class Population(Declaration):
         if self._true_variances.min() < -ROUNDING:
             yield (
                 "gauge is larger than the spread of some combination of the columns, which correlate more than its scatter "
-                "allows; check its units, or leave gauge out"
+                "allows, as in tables with few rows; check its units, measure more parts, or leave gauge out"
             )
 
     @cached_property
@@ -130,9 +134,9 @@ class Population(Declaration):
 
     @property
     def _true_variances(self) -> np.ndarray:
-        """The variances (k,) without the gauge in principal directions, as shares of the measured ones; perhaps below 0."""
-        _, _, _, inverse, true = self._split
-        return np.linalg.eigvalsh(inverse @ true @ inverse)
+        """The eigenvalues (k,) of the covariance without the gauge, as shares of measured variances; perhaps below 0."""
+        scale = self.within[np.array(self.gauge) > 0]
+        return np.linalg.eigvalsh(self._split[-1] / np.outer(scale, scale))
 
     @property
     def _split(self) -> tuple[np.ndarray, ...]:

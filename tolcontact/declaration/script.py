@@ -82,6 +82,17 @@ if __name__ == "__main__":
 _PACKAGE = Path(__file__).resolve().parent
 
 
+def parameter_fault(declare: Callable[..., Any], arguments: Mapping[str, Any]) -> str:
+    """Return why a function does not take these arguments, with its parameters; empty if it does, or there are none."""
+    signature = inspect.signature(declare)
+    try:
+        signature.bind(**arguments)
+    except TypeError as error:
+        name = getattr(declare, "__name__", "the function")
+        return f"{name}({', '.join(signature.parameters)}) {error}" if arguments else ""
+    return ""
+
+
 def load_model(path: Path, arguments: Mapping[str, Any] = NO_ARGUMENTS) -> Assembly:
     """Return the assembly that a script or a JSON file declares; the script's function `assembly` takes the `arguments`.
 
@@ -106,6 +117,8 @@ def load_model(path: Path, arguments: Mapping[str, Any] = NO_ARGUMENTS) -> Assem
             raise ScriptError(
                 f'model script "{path}" has no function assembly(); define one that returns a tolcontact.Assembly'
             )
+        if fault := parameter_fault(declare, arguments):
+            raise ScriptError(f'model script "{path}": {fault}')
         declared = declare(**arguments)
     except ScriptError:
         raise

@@ -192,7 +192,13 @@ def _measured(row: Mapping[str, str], numbers: Mapping[str, float]) -> Tolerance
 def _zone(row: Mapping[str, str], numbers: Mapping[str, float]) -> tuple[float, Any]:
     """Return the nominal value and the tolerance of a row. Raises ValueError for a cell that is empty or states neither."""
     is_measured = any(name in numbers for name in MEASURED)
-    limits = ("mean", "sd") if is_measured else ("tolerance",) if "tolerance" in row else ("upper", "lower")
+    limits = (
+        ("mean", "sd")
+        if is_measured or not {"tolerance", "upper"} & set(row)
+        else ("tolerance",)
+        if "tolerance" in row
+        else ("upper", "lower")
+    )
     if empty := [name for name in ("name", "nominal", *limits) if not row.get(name)]:
         raise ValueError(f"{' and '.join(empty)} {'is' if len(empty) == 1 else 'are'} empty")
     nominal = numbers["nominal"]

@@ -146,8 +146,10 @@ class Tolerance(Readable):
         """Return the tolerance in words, of a variable with these units."""
         if hasattr(self.frozen, "dist"):
             spread = f"scipy.stats.{self.frozen.dist.name}"
+            if self.frozen.dist.name == "norm":
+                spread = f"mean {self.frozen.mean():g}, standard deviation {self.frozen.std():g} {units}"
             if self.parts:
-                spread = f"mean {self.frozen.mean():g}, standard deviation {self.frozen.std():g} {units} of {self.parts} parts"
+                spread += f" of {self.parts} parts"
         else:
             width = f"{self.range:g} {units}" if is_length(self.range) else repr(self.range)
             spread = f"{self.distribution}, full width {width}"

@@ -92,11 +92,13 @@ def clashes_beyond_faces(draws: TrialDraws) -> Iterator[str]:
         beyond = [k for k, place in enumerate(measured.places) if place.is_beyond(faces)]
         if measured.share > MIN_SHARE and beyond:
             parts = _parts(nominal, clash.pair)
-            pair = next(pair for pair in nominal.assembly.pairs if {pair.moving.part, pair.reference.part} == parts)
             moving, reference = moving_first(nominal, clash.pair)
+            pairs = (pair for pair in nominal.assembly.pairs if {pair.moving.part, pair.reference.part} == parts)
+            pair = next(pairs, None)  # parts that touch only at supports have none
+            designation, where = (moving.part.designation, "supports") if pair is None else (pair.designation, "chosen faces")
             yield (
-                f'{pair.designation}: part "{moving.name}" still lies in part "{reference.name}" beyond the '
-                f"chosen faces in {_extent(few, measured, beyond[0], 'draws that interfere without contact')}; "
+                f'{designation}: part "{moving.name}" still lies in part "{reference.name}" beyond the '
+                f"{where} in {_extent(few, measured, beyond[0], 'draws that interfere without contact')}; "
                 f"declare their contact there, too: "
                 f"{contact_line(nominal, clash.pair, measured.places[beyond[0]])}, or say that it is meant: "
                 f"{overlap_line(nominal, clash.pair)}"

@@ -19,20 +19,29 @@ URGENCY = {FAILS: 2.0, UNDECIDED: 1.0, "": 0.0, CONSTANT: -1.0, MEETS: -1.0}
 def brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
     """Return the summary of the measurements that fall short of their limits, and a remark about all others.
 
-    All measurements are kept if there are few. If none falls short, the first ones are kept.
+    All measurements are kept if there are few. One that is not a number in some realizations falls short. If none does, the
+    first ones are kept.
     """
     count = summary.sizes[terms.MEASURE]
     if count <= MOST_LISTED:
         return summary, ""
     measures = [summary.isel(measure=index) for index in range(count)]
     opinions = [verdict_of(measure, summary.attrs["realizations"]) for measure in measures]
-    verdicts = ["" if opinion is None else opinion.word for opinion in opinions]
+    verdicts = [
+        FAILS if int(measure[terms.NOT_A_NUMBER].values) else "" if opinion is None else opinion.word
+        for measure, opinion in zip(measures, opinions, strict=True)
+    ]
     shares = [float(m["statistic_value"].sel(state=terms.STATES[1], statistic=terms.OUTSIDE)[0]) for m in measures]
     urgencies = [URGENCY[verdict] + float(np.nan_to_num(share)) / 2 for verdict, share in zip(verdicts, shares, strict=True)]
     failing = [index for index in _largest(urgencies, MOST_LISTED) if verdicts[index] in (FAILS, UNDECIDED)]
     selection = failing or list(range(MOST_LISTED))
     remainder = [verdict for index, verdict in enumerate(verdicts) if index not in selection]
-    phrases = {"fall short, too": (FAILS, UNDECIDED), "without limits": ("",), "meet their limits": (MEETS, CONSTANT)}
+    phrases = {
+        "fall short, too": (FAILS,),
+        "undecided": (UNDECIDED,),
+        "without limits": ("",),
+        "meet their limits": (MEETS, CONSTANT),
+    }
     counts = {phrase: sum(verdict in group for verdict in remainder) for phrase, group in phrases.items()}
     remark = ", ".join(f"{number} more {phrase}" for phrase, number in counts.items() if number)
     return summary.isel(measure=selection), f"{remark}; {EVERYTHING}"
