@@ -5,7 +5,8 @@ The total index of a set of groups is at least the total index of each group in 
 index of all minor groups bounds the first-order and total index of each of them, and costs as much as one group.
 """
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -31,6 +32,10 @@ MINOR_SHARE = 0.01  # of the variance of any measure in any state: the largest j
 MIN_EFFECTIVE = 16  # effective base realizations behind the variance of a measure: with fewer, no group is minor
 BUDGET = 60_000  # realizations in total that determine the default number of base realizations
 MIN_SAMPLES, MAX_SAMPLES = 512, 4096  # base realizations by default
+LONG = 30_000  # realizations at most: with more to come, a first look is shown
+MAX_LOOKS, LARGEST = 10, 4  # measures, and shares of each, of a first look
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +147,11 @@ def contributions(
     analysis.check_varies(groups)
     released = ReleasedDraws(program.draws, units) if len(units) > len(groups) else None
     engine = analysis.engine(analysis.samples * _realizations_each(len(groups), released))
+    slopes = total_derivatives(program)
+    linear = [_linear_shares(program, deviations, row, groups.values()) for row in slopes]
+    if engine.total > LONG:
+        for line in first_look([measure.name for measure in program.nominal.measures], list(groups), linear):
+            log.warning(line)
     screening = screened(engine, groups, seed) if analysis.samples > 2 * SCREENING_SAMPLES else Screening.none(groups)
     mixed = MixedDraws(program.draws, screening.estimated)
     realizations_each = _realizations_each(len(screening.estimated), released)
@@ -149,11 +159,11 @@ def contributions(
         samples = int(np.clip((BUDGET - engine.simulated) // realizations_each, MIN_SAMPLES, MAX_SAMPLES))
     engine.total = engine.simulated + samples * realizations_each
     measured, A, _ = engine.simulate_design(mixed, samples, seed=seed, observe=partial(_first_deviations, mixed.size))
-    slopes, A = total_derivatives(program), program.draws.without_shared_causes(A[:, 0])
+    A = program.draws.without_shared_causes(A[:, 0])
     values = {
         **_indices(screening, measured, program.accuracies),
         "shapley": _shapley_effects(engine, released, samples, seed),
-        "linear": [_linear_shares(program, deviations, row, groups.values()) for row in slopes],
+        "linear": linear,
         "missed": [
             [missed(f, A @ row, accuracy) for f in states]
             for states, row, accuracy in zip(measured[:, 0].transpose(2, 1, 0), slopes, program.accuracies, strict=True)
@@ -162,6 +172,15 @@ def contributions(
     }
     labels = {terms.GROUP: list(groups), terms.UNIT: [] if released is None else list(units)}
     return analysis.dataset(values, labels, base_realizations=samples, realizations=engine.simulated, by=by)
+
+
+def first_look(measures: Sequence[str], groups: Sequence[str], linear: Sequence[np.ndarray]) -> Iterator[str]:
+    """Yield a line for each of the first measures: its largest linear shares (measure, group), which need no simulation."""
+    yield "a first look, linear and without contact, until the shares with contact are known (in % of the variance):"
+    for name, shares in list(zip(measures, linear, strict=True))[:MAX_LOOKS]:
+        order = [k for k in np.argsort(-shares)[:LARGEST] if shares[k] > MINOR_SHARE]
+        found = ", ".join(f"{groups[k]} {100 * shares[k]:.0f}" for k in order)
+        yield f"  {name}: {found or 'no share, or a kink in the nominal assembly'}"
 
 
 def _realizations_each(groups: int, released: ReleasedDraws | None) -> int:
