@@ -32,6 +32,8 @@ STUDIES = {
     "cost/cluster.py": ["--samples", "20000", "--to", "."],
     "cost/measure.py": ["--scenes", "ra1", "ring", "--sizes", "3", "--seconds", "0.01", "--to", "."],
     "cost/solvers.py": ["--realizations", "2", "--to", "."],
+    "drawings/rules.py": ["--to", "."],
+    "drawings/six.py": ["--samples", "40", "--to", "."],
     "elastic/measure.py": ["--realizations", "5", "--rows", "38", "--to", "."],
     "exact/tables.py": ["--samples", "300", "--to", "."],
     "form/measure.py": ["--samples", "20", "--to", "."],

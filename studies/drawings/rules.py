@@ -3,7 +3,9 @@
 All answers are worst cases by the zones and limits of the drawing: closed forms, which a search over the zones has to find.
 """
 
+import argparse
 import warnings
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import trimesh
@@ -101,10 +103,13 @@ RULES = (
 
 def main() -> None:
     """Print the table, and write it into the README."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--to", type=Path, help="folder of a README with the table: by default the study's")
+    arguments = parser.parse_args()
     warnings.simplefilter("ignore", NominalWarning)
     rows: list[list[object]] = [["rule", "standard", "example", "answer, mm", "worst case computed, mm"]]
     rows += [[*rule[:4], extremes(rule.model, rule.measure)] for rule in RULES]
-    write(__file__, {"rules": rows})
+    write(__file__, {"rules": rows}, arguments.to)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ Each function declares its drawing, with zones `times` as wide. Faces are chosen
 around a hole. Six minutes or less.
 """
 
+import argparse
 import gzip
 import inspect
 import tempfile
@@ -22,7 +23,6 @@ from studies.tables import with_interval, write
 from tolcontact.errors import NominalWarning
 from tolcontact.vocabulary import Status
 
-SAMPLES = 2000
 NIST = Path(__file__).parents[1] / "benchmarks" / "cad" / "nist_ctc_01_asme1_ap242-e1.stp.gz"
 Place = tuple[float, float]
 
@@ -164,9 +164,9 @@ def located(model: tc.Assembly, upper: Any) -> None:
     model.contact("seat", moving=upper.face("-z"), reference=model.parts[0].face("+z"))
 
 
-def failing(model: tc.Assembly) -> str:
+def failing(model: tc.Assembly, samples: int) -> str:
     """Return the percentage of realizations that cannot be assembled, with its interval."""
-    with tc.run(model, samples=SAMPLES, fields="none", surfaces=0) as results:
+    with tc.run(model, samples=samples, fields="none", surfaces=0) as results:
         status = results.to_dataset()["status"].values
     count = int((status == Status.NOT_ASSEMBLABLE).sum())
     lost = int(np.isin(status, [Status.NOT_CONVERGED, Status.DOUBTFUL]).sum())
@@ -183,15 +183,21 @@ def extremes(model: tc.Assembly, measure: str) -> str:
 
 def main() -> None:
     """Print the table, and write it into the README."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=int, default=2000, help="realizations of each assembly")
+    parser.add_argument("--to", type=Path, help="folder of a README with the table: by default the study's")
+    arguments = parser.parse_args()
     warnings.simplefilter("ignore", NominalWarning)
     rows: list[list[object]] = [["drawing", "lines", "s", "asked", "expected", "computed", "left out"]]
     for make, asked, expected, measure, left_out in DRAWINGS:
         began = time.process_time()
-        computed = extremes(make(1), measure) if measure else "; ".join(failing(make(times)) for times in (1, 4))
+        computed = (
+            extremes(make(1), measure) if measure else "; ".join(failing(make(times), arguments.samples) for times in (1, 4))
+        )
         lines = len(inspect.getsource(make).splitlines()) - 3  # without its name, docstring and result
-        name, seconds = make.__name__.replace("_", " "), round(time.process_time() - began)
+        name, seconds = make.__name__.replace("_", " "), f"{time.process_time() - began:.1f}"
         rows.append([name, lines, seconds, asked, expected, computed, left_out])
-    write(__file__, {"drawings": rows})
+    write(__file__, {"drawings": rows}, arguments.to)
 
 
 if __name__ == "__main__":

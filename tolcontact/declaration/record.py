@@ -3,7 +3,7 @@
 import inspect
 import operator
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import MISSING, dataclass, replace
 from functools import cached_property, reduce
 from types import MappingProxyType, NoneType
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -92,10 +92,12 @@ class Record(Codec):
         key = self.mark if self.mark and name == self.names[0] else self._keys.get(name, name)
         default = getattr(inspect.signature(self.cls).parameters.get(name), "default", inspect.Parameter.empty)
         is_required, is_omitted = default is inspect.Parameter.empty, name in self._omitted
+        factory = getattr(getattr(self.cls, "__dataclass_fields__", {}).get(name), "default_factory", MISSING)
+        usual = default if factory is MISSING else factory()
 
         def split(thing: Any, writing: Any) -> Document:
             value = tuple(getattr(thing, member) for member in (name, *others)) if others else getattr(thing, name)
-            is_default = is_omitted and not isinstance(value, np.ndarray) and value == default
+            is_default = is_omitted and not isinstance(value, np.ndarray) and value == usual
             return {} if is_default else {key: value}
 
         def join(values: Document, place: Place) -> Document:
