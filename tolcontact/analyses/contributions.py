@@ -149,9 +149,8 @@ def contributions(
     engine = analysis.engine(analysis.samples * _realizations_each(len(groups), released))
     slopes = total_derivatives(program)
     linear = [_linear_shares(program, deviations, row, groups.values()) for row in slopes]
-    if engine.total > LONG:
-        for line in first_look([measure.name for measure in program.nominal.measures], list(groups), linear):
-            log.warning(line)
+    for line in first_look(program, list(groups), linear) if engine.total > LONG else ():
+        log.warning(line)
     screening = screened(engine, groups, seed) if analysis.samples > 2 * SCREENING_SAMPLES else Screening.none(groups)
     mixed = MixedDraws(program.draws, screening.estimated)
     realizations_each = _realizations_each(len(screening.estimated), released)
@@ -159,23 +158,29 @@ def contributions(
         samples = int(np.clip((BUDGET - engine.simulated) // realizations_each, MIN_SAMPLES, MAX_SAMPLES))
     engine.total = engine.simulated + samples * realizations_each
     measured, A, _ = engine.simulate_design(mixed, samples, seed=seed, observe=partial(_first_deviations, mixed.size))
-    A = program.draws.without_shared_causes(A[:, 0])
     values = {
         **_indices(screening, measured, program.accuracies),
         "shapley": _shapley_effects(engine, released, samples, seed),
         "linear": linear,
-        "missed": [
-            [missed(f, A @ row, accuracy) for f in states]
-            for states, row, accuracy in zip(measured[:, 0].transpose(2, 1, 0), slopes, program.accuracies, strict=True)
-        ],
+        "missed": _missed(program, measured[:, 0], A[:, 0], slopes),
         "by_status": engine.statuses,
     }
     labels = {terms.GROUP: list(groups), terms.UNIT: [] if released is None else list(units)}
     return analysis.dataset(values, labels, base_realizations=samples, realizations=engine.simulated, by=by)
 
 
-def first_look(measures: Sequence[str], groups: Sequence[str], linear: Sequence[np.ndarray]) -> Iterator[str]:
+def _missed(program: Program, measured: np.ndarray, deviations: np.ndarray, slopes: np.ndarray) -> list[Any]:
+    """Return the shares (measure, state, interval) of variance that linear predictions miss."""
+    own = program.draws.without_shared_causes(deviations)
+    return [
+        [missed(f, own @ row, accuracy) for f in states]
+        for states, row, accuracy in zip(measured.transpose(2, 1, 0), slopes, program.accuracies, strict=True)
+    ]
+
+
+def first_look(program: Program, groups: Sequence[str], linear: Sequence[np.ndarray]) -> Iterator[str]:
     """Yield a line for each of the first measures: its largest linear shares (measure, group), which need no simulation."""
+    measures = [measure.name for measure in program.nominal.measures]
     yield "a first look, linear and without contact, until the shares with contact are known (in % of the variance):"
     for name, shares in list(zip(measures, linear, strict=True))[:MAX_LOOKS]:
         order = [k for k in np.argsort(-shares)[:LARGEST] if shares[k] > MINOR_SHARE]

@@ -5,7 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER
+from tests.helpers import PAPER, compiled
 from tests.test_contributions import of_normal
 from tolcontact.analyses.analysis import independent_groups
 from tolcontact.analyses.contributions import first_look
@@ -83,7 +83,7 @@ def test_released_draws_do_not_depend_on_blocks_and_keep_correlations():
 
 
 def test_a_first_look_names_the_largest_linear_shares():
-    linear = [np.array([0.005, 0.7, 0.295]), np.full(3, np.nan)]
-    heading, *lines = first_look(["height", "gap"], ["a.A1", "b.top", "c.C1"], linear)
-    assert "without contact" in heading
-    assert lines == ["  height: b.top 70, c.C1 30", "  gap: no share, or a kink in the nominal assembly"]
+    program, groups = compiled(cases.ra1()), ["a.A1", "b.top", "c.C1"]
+    heading, line = first_look(program, groups, [np.array([0.005, 0.7, 0.295])])
+    assert "without contact" in heading and line == "  corner height: b.top 70, c.C1 30"
+    assert [*first_look(program, groups, [np.full(3, np.nan)])][1].endswith(": no share, or a kink in the nominal assembly")
