@@ -1,10 +1,13 @@
 """tolcontact summary, tolcontact report."""
 
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
-import lazy_loader
+import numpy as np
 import typer
+import xarray as xr
 
 from tolcontact import archive as archives, report as reports, workflow
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, echo, examples, flag, only_one
@@ -25,8 +28,6 @@ from tolcontact.cli.output import (
 from tolcontact.cli.progress import waiting
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
-
-first_order = lazy_loader.load("tolcontact.analyses.first_order")  # few reports need its models
 
 
 @app.command(
@@ -55,6 +56,12 @@ def summary(
         print_summary(estimates, is_whole=whole)
 
 
+def _first_order_variances(results: xr.DataTree) -> np.ndarray:
+    """Return first-order variances of a run. Few reports need the model, and all that it takes to build it."""
+    variances: np.ndarray = import_module("tolcontact.analyses.first_order").first_order_variances(results)
+    return variances
+
+
 @app.command(epilog=examples("report run.nc", "report run.nc --out page.html", "report run.nc --xlsx tables.xlsx"))
 def report(
     archive: Archive,
@@ -78,7 +85,7 @@ def report(
     with waiting(f"writing the report of {archive}"), archives.open_archive(archive) as results:
         summary, titles = workflow.summarize(results), title_block_of(results.attrs).overridden(entries)
         if page is not None:
-            reports.write_page(results, summary, page, titles, lambda: first_order.first_order_variances(results))
+            reports.write_page(results, summary, page, titles, partial(_first_order_variances, results))
         if xlsx is not None:
             reports.write_spreadsheet(results, summary, xlsx, titles)
     for kind, path in (("report", page), ("spreadsheet", xlsx)):
