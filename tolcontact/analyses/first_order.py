@@ -13,12 +13,10 @@ from tolcontact.workflow.models import DEFAULT_SOLVER, method_of
 def first_order_variances(results: xr.DataTree) -> np.ndarray:
     """Return the variance (measure, contributor) of each measure of a run by its nominal derivatives; NaN at a kink.
 
-    Measured parts have the variance of their rows. Raises ModelError or ArchiveError for a model that cannot be rebuilt.
+    Contributors have the variance of their own distributions. Raises ModelError or ArchiveError if the model cannot be rebuilt.
     """
     assembly = model_of(results)
     choice = method_of(assembly, None)
     program = compile_program(discretize(assembly, presses=choice.minimizes.presses), DEFAULT_SOLVER, choice)
     variances = np.array([contributor.variance for contributor in program.draws.contributors])
-    for columns, values in program.draws.populations:
-        variances[columns] = values.var(axis=0)
     return total_derivatives(program) ** 2 * variances

@@ -32,30 +32,34 @@ class ContributorShares(NamedTuple):
     shares   (group, interval) of the variance; empty if none are shown
     note     a sentence: R^2, or the reason why no shares are shown
     title    what they are shares of
+    is_open  whether no shares are shown because the realizations do not suffice
     """
 
     groups: list[str]
     shares: np.ndarray
     note: str
     title: str = "Contributors, with contact"
+    is_open: bool = False
 
 
 def shares_or_first_order(
     results: xr.DataTree, realizations: int, variances: Callable[[], np.ndarray] | None
 ) -> list[ContributorShares]:
-    """Return the shares for each measurement; where none can be estimated, first-order ones from `variances`, if it is given.
+    """Return the shares for each measurement; where realizations do not suffice, first-order ones from `variances`, if given.
 
-    It returns the variance (measure, contributor) that each contributor causes to first order, without contact.
+    It returns the variance (measure, contributor) that each contributor causes to first order, without contact. These add up
+    for independent contributors, so there are none with correlations or populations.
     """
-    estimated = contributor_shares(results, realizations)
-    if variances is None or all(shares.groups for shares in estimated):
+    estimated, document = contributor_shares(results, realizations), json.loads(_declaration(results))
+    is_joint = document.get("correlations") or document.get("populations")
+    if variances is None or is_joint or not any(shares.is_open for shares in estimated):
         return estimated
     try:
         rows = variances()
     except TolcontactError:  # the model cannot be rebuilt
         return estimated
     return [
-        shares if shares.groups else _first_order(results, row, shares) for shares, row in zip(estimated, rows, strict=True)
+        _first_order(results, row, shares) if shares.is_open else shares for shares, row in zip(estimated, rows, strict=True)
     ]
 
 
@@ -78,7 +82,7 @@ def contributor_shares(results: xr.DataTree, realizations: int) -> list[Contribu
     names = results.to_dataset()[terms.MEASURE].values
     sample = results["sample"].to_dataset()
     if terms.DEVIATION.name not in sample:
-        return [_without("The archive has no deviations of contributors (run with --keep all).")] * len(names)
+        return [_without("The archive has no deviations of contributors (run with --keep all).", is_open=True)] * len(names)
     selection = {terms.REALIZATION: slice(min(realizations, MAX_REALIZATIONS))}
     x = sample[terms.DEVIATION.name].isel(selection).values
     columns = np.flatnonzero(np.ptp(x, axis=0) > 0)
@@ -88,7 +92,7 @@ def contributor_shares(results: xr.DataTree, realizations: int) -> list[Contribu
     if len(x) < required or len(columns) > MAX_CONTRIBUTORS:
         reason = f"Shares of {grouped(len(columns))} contributors cannot be estimated from {grouped(len(x))} realizations"
         advice = f"at least {grouped(required)} are needed" if len(x) < required else "use tolcontact contributions"
-        return [_without(f"{reason}; {advice}.")] * len(names)
+        return [_without(f"{reason}; {advice}.", is_open=True)] * len(names)
     members = _groups(results, sample, columns)
     y = results.to_dataset()[terms.MEASURED.name].isel(selection).values[:, terms.CORRECTED]
     shares = linear_shares(x[:, columns], y, list(members.values()))
@@ -116,8 +120,12 @@ def _shown(names: list[str], shares: LinearShares | None, count: int) -> Contrib
     return ContributorShares([names[k] for k in order], shares.shares[order], note)
 
 
-def _without(note: str) -> ContributorShares:
-    return ContributorShares([], np.zeros((0, len(terms.ESTIMATE))), note)
+def _without(note: str, *, is_open: bool = False) -> ContributorShares:
+    return ContributorShares([], np.zeros((0, len(terms.ESTIMATE))), note, is_open=is_open)
+
+
+def _declaration(results: xr.DataTree) -> str:
+    return str(results["model"][terms.DECLARATION.name].values)
 
 
 def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> dict[str, np.ndarray]:
@@ -140,7 +148,7 @@ def _owner(label: str, source: str) -> str:
 
 def _drawn_together(results: xr.DataTree) -> Iterator[list[str]]:
     """Yield labels of contributors that the model declares to depend on each other."""
-    document = json.loads(str(results["model"][terms.DECLARATION.name].values))
+    document = json.loads(_declaration(results))
     for correlation in document.get("correlations", []):
         yield list(correlation["labels"])
     for variable in document.get("variables", []):

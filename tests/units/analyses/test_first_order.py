@@ -31,3 +31,13 @@ def test_the_report_shows_them_with_their_name(tmp_path):
     page = (tmp_path / "few.html").read_text()
     assert "These are first-order shares, by sensitivities of the nominal assembly, without contact." in page
     assert "Contributors, first order, without contact" in page
+
+
+def test_there_are_none_where_linear_shares_would_mislead_or_contributors_are_correlated(tmp_path):
+    correlated = cases.ra1()
+    correlated.correlate(["top.A1", "top.A2"], 0.5)
+    for number, (model, samples) in enumerate([(cases.ra1(), 400), (correlated, 12)]):
+        path = tmp_path / f"{number}.nc"
+        tc.run(model, samples=samples, solver="daqp", out=path).close()
+        with tc.open_archive(path) as run:
+            assert all("first order" not in shares.title for shares in shares_or_first_order(run, samples, lambda: 1 / 0))
