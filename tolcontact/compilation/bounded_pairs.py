@@ -120,7 +120,7 @@ def _bounded_pair(
         overlap=pair.coordinate_error + _overlap(watch, pair),
         clearance=clearance(pair),
     )
-    pair_meeting = meeting((pair.moving_face, pair.reference_face), bodies, reach)
+    pair_meeting = meeting((pair.moving_face, pair.reference_face), bodies, reach, has_form=pair.has_form)
     if pair_meeting is not None:
         _check_corners(nominal, pair, pair_meeting)
     else:

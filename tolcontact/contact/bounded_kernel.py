@@ -2,37 +2,42 @@
 
 import numpy as np
 
-from tolcontact.compiled import compiled, uncounted
+from tolcontact.compiled import compiled, inlined_uncounted, uncounted
+
+
+@inlined_uncounted
+def _gap(X, places, feet, normals, heights, k, p):  # type: ignore[no-untyped-def]
+    """Return the gap of place p of realization k at X_RM (12,), above a plane raised by its height."""
+    gap = -heights[k, p]
+    for i in range(3):
+        x = X[9 + i] - feet[k, p, i]
+        for j in range(3):
+            x += X[3 * i + j] * places[k, p, j]
+        gap += x * normals[k, p, i]
+    return gap
 
 
 @compiled
-def gaps(relative, places, feet, normals, heights, values):  # type: ignore[no-untyped-def]
-    """Add to values (n, place), 0 or infinite before, the gaps at X_RM (n, 12), above planes raised by heights (n, place)."""
+def gaps(relative, places, feet, normals, heights, valid, values):  # type: ignore[no-untyped-def]
+    """Write the gaps (n, place) at X_RM (n, 12), above planes raised by heights (n, place); infinite where not valid."""
     for k in range(relative.shape[0]):
-        X = relative[k]
         for p in range(places.shape[1]):
-            if values[k, p] == np.inf:
-                continue
-            gap = -heights[k, p]
-            for i in range(3):
-                x = X[9 + i] - feet[k, p, i]
-                for j in range(3):
-                    x += X[3 * i + j] * places[k, p, j]
-                gap += x * normals[k, p, i]
-            values[k, p] = gap
+            values[k, p] = _gap(relative[k], places, feet, normals, heights, k, p) if valid[k, p] else np.inf
 
 
 @compiled
-def deepest(labels, feet, values, distance, numbers, depths):  # type: ignore[no-untyped-def]
-    """Write labels and depths of the deepest places (n, m), deepest first; where there are fewer, some label, and -inf.
+def deepest(relative, labels, places, feet, normals, heights, valid, distance, numbers, depths):  # type: ignore[no-untyped-def]
+    """Write labels and depths of the deepest places (n, m) at X_RM (n, 12), deepest first.
 
-    Places outside within a `distance` [mm] of a deeper one are left out: of two that nearly coincide, either could be active,
+    Where there are fewer places, it writes some label, and -inf. Places outside within a `distance` [mm] of a deeper one are left out: of two that nearly coincide, either could be active,
     and the choice should not be left to the solver.
     """
-    for k in range(values.shape[0]):
+    for k in range(labels.shape[0]):
         count = 0
-        for p in range(values.shape[1]):
-            depth = -values[k, p]
+        for p in range(labels.shape[1]):
+            if not valid[k, p]:
+                continue
+            depth = -_gap(relative[k], places, feet, normals, heights, k, p)
             if not depth > -np.inf:
                 continue
             j = min(count, numbers.shape[1] - 1)

@@ -57,9 +57,15 @@ class SearchedPlaces(NamedTuple):
 
     def gaps(self, relative: Float[Array, "realization 12"]) -> Float[Array, "realization place"]:
         """Return the gaps [mm] at X_RM; infinite where there is no place."""
-        gaps = np.where(self.valid, 0.0, np.inf)
-        bounded_kernel.gaps(np.ascontiguousarray(relative), self.P_m, self.P_r, self.n_r, self.heights, gaps)
+        gaps = np.empty(self.labels.shape)
+        bounded_kernel.gaps(np.ascontiguousarray(relative), *self[1:], gaps)
         return gaps
+
+    def deepest(self, relative: Float[Array, "realization 12"], count: int, distance: float) -> Deepest:
+        """Return the deepest places at X_RM, at most `count`, see bounded_kernel.deepest."""
+        found = Deepest(np.empty((len(relative), count), dtype=np.int64), np.empty((len(relative), count)))
+        bounded_kernel.deepest(np.ascontiguousarray(relative), *self, distance, *found)
+        return found
 
     def rows(self, labels: Int[Array, "realization slot"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return P^m, P^r, n^r (realization, slot, 3) of the places with some labels, on deviating faces."""
@@ -105,10 +111,7 @@ class BoundedScan(Scan):
         return -gaps.min(axis=1, initial=0.0)
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
-        places, shape = self.places, (len(relative), min(MAX_DEEPEST, self.places.labels.shape[1]))
-        deepest = Deepest(np.empty(shape, dtype=np.int64), np.empty(shape))
-        bounded_kernel.deepest(places.labels, places.P_r, places.gaps(relative), self.meeting.reach.spread, *deepest)
-        return deepest
+        return self.places.deepest(relative, min(MAX_DEEPEST, self.places.labels.shape[1]), self.meeting.reach.spread)
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.places.rows(points)
@@ -136,6 +139,7 @@ def bounded_scan(
     parting: Parting | None = None,
     former_labels: Int[Array, "n slot"] | None = None,
     deepest: Float[Array, " n"] | None = None,
+    ceilings: Float[Array, " n"] | None = None,
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see raised_places for the other arguments.
 
@@ -144,7 +148,7 @@ def bounded_scan(
     `former_labels` (n, slot) are of places that were active before, -1 for none. Places deeper than `deepest` (n,) [mm] do
     not count.
     """
-    raised = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth)
+    raised = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth, ceilings)
     if deepest is not None:
         raised = raised.only(raised.gaps >= -deepest[:, None])
     if guard is not None:

@@ -28,6 +28,7 @@ MAX_CLUSTERS = 6
 FORM_CLUSTERS = 8  # of faces with form, which touch at more places
 APART = 2.0  # times the error of planes beyond their edges: bodies under load are no further apart
 EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
+CEILING_SHARE = 1e-4  # of the size: gaps of bodies at rest above which places need not be known
 BULGE_SHARE = 1 / 2500  # of the same: accepted penetration of planes with form between contact points
 MIN_BULGE = 1e-7  # mm
 OVERHANG_SHARE = 0.01  # of their radius: overhang beyond a wall at which balls and shafts that travelled far may be active
@@ -80,6 +81,7 @@ class Candidates:
     bounded      the meetings of pairs whose places are found at every pose, by their index in the group
     guards       guards of these pairs, one for each two bodies: the guard of their first pair
     free_depth   [mm]: the largest penetration of free bodies
+    ceiling      [mm]: gaps of bodies at rest above which places need not be known
     """
 
     def __init__(self, program: Program, group: ContactGroup) -> None:
@@ -114,6 +116,7 @@ class Candidates:
             k for k in self._varying if searches and np.isfinite(smallest) and self._pairs[k].minima is not None
         }
         self.bounded = {k: program.meetings[index] for k, index in enumerate(group.group.pairs) if index in program.meetings}
+        self.ceiling = CEILING_SHARE * max((meeting.size for meeting in self.bounded.values()), default=0.0)
         guards = {k: Guard.of(program, group.group.pairs[k]) for k in self.bounded}
         self._guards = {k: guard for k, guard in guards.items() if guard is not None}
         of_bodies = {id(guard.neighbours): k for k, guard in reversed(self._guards.items())}
@@ -133,6 +136,7 @@ class Candidates:
         earlier: Sequence[Scan] = (),
         start: Start = FIRST,
         deepest: Float[Array, " realization"] | None = None,
+        ceilings: Float[Array, " realization"] | None = None,
     ) -> list[Scan]:
         """Return scans of the points that may be active.
 
@@ -152,7 +156,7 @@ class Candidates:
                 former_labels = slots[self._varying.index(k)].labels if slots and (width > 0 or start.guarded) else None
                 kept = None if former_labels is None or width == 0 else self._kept(former_labels, former, at_rest)
                 limits = np.full(len(X_RM), self.free_depth) if start.free and deepest is None else deepest
-                scans.append(self._bounded(k, X_RM, deviations, start, kept, width, former_labels, limits))
+                scans.append(self._bounded(k, X_RM, deviations, start, kept, width, former_labels, limits, ceilings))
             elif start.projected and k in self._margins:
                 scans.append(self.projected(k, X_RM))
             elif self._pairs[k].has_form:
@@ -179,6 +183,7 @@ class Candidates:
         width: float,
         former_labels: np.ndarray | None,
         limits: np.ndarray | None,
+        ceilings: np.ndarray | None,
     ) -> BoundedScan:
         """Return the scan of a bounded pair at X_RM (n, 12), see `scans` and bounded_scan."""
         meeting = self.bounded[k]
@@ -193,6 +198,7 @@ class Candidates:
             parting=self.partings.get(k) if start.parted else None,
             former_labels=former_labels,
             deepest=limits,
+            ceilings=ceilings,
         )  # fmt: skip
 
     def _raised(self, k: int, former: Scan | None, X_RM: np.ndarray, deviations: np.ndarray, *, in_steps: bool) -> Scan:

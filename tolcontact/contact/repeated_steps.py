@@ -24,6 +24,7 @@ STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
 ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that are almost unconstrained
 NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beyond sharp edges
 MAX_IDLE = 3  # steps in a row that end where they begin, because bodies would penetrate: the next ones hardly ever differ
+OUTLOOK = 4.0  # steps: places with larger gaps are not looked for, since the next step is hardly ever larger than the last
 CLOSED = 1e-6  # mm, and of rotation matrices: steps that return this close to an earlier pose repeat themselves
 
 
@@ -123,7 +124,7 @@ def repeat(
         if not len(unsettled):
             return
         if candidates.change:
-            _find_places(candidates, unsettled, phase.width, (size[moves] < NEARLY_AT_REST) & phase.sharp, start)
+            _find_places(candidates, unsettled, phase, size[moves], start)
         if phase.newton:
             penetration = unsettled.state.slack if step.bends else _true_penetration(unsettled.task, unsettled.state)
             progress = progress or Progress.start(unsettled.state)
@@ -136,10 +137,14 @@ def repeat(
     _end(unsettled, progress, unrest, np.ones(len(unsettled), dtype=bool))
 
 
-def _find_places(candidates: Candidates, unsettled: Unsettled, width: float, at_rest: np.ndarray, start: Start) -> None:
-    """Find the contact places at the poses of unsettled realizations."""
-    poses, task, slots = unsettled.state.relative, unsettled.task, unsettled.state.slots
-    scans = candidates.scans(poses, task.deviations, slots=slots, width=width, at_rest=at_rest, earlier=task.scans, start=start)
+def _find_places(candidates: Candidates, unsettled: Unsettled, phase: Phase, size: Float[Array, " n"], start: Start) -> None:
+    """Find the contact places at the poses of unsettled realizations, after steps of a size (n,) [mm]."""
+    task = unsettled.task
+    scans = candidates.scans(
+        unsettled.state.relative, task.deviations, slots=unsettled.state.slots, width=phase.width,
+        at_rest=(size < NEARLY_AT_REST) & phase.sharp, earlier=task.scans, start=start,
+        ceilings=None if start.free else candidates.ceiling + OUTLOOK * size,
+    )  # fmt: skip
     unsettled.task = replace(task, scans=scans)
 
 

@@ -142,7 +142,10 @@ class ContactResolver:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = start.projected
         self._leave_adrift(task, state)
-        scans = self._candidates.scans(state.relative, task.deviations, earlier=task.scans, start=start, slots=state.slots)
+        scans = self._candidates.scans(
+            state.relative, task.deviations, earlier=task.scans, start=start, slots=state.slots,
+            ceilings=None if start.free else np.full(len(state), self._candidates.ceiling),
+        )  # fmt: skip
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:

@@ -30,14 +30,16 @@ def raised_places(
     error: float = 0.0,
     nearness: float = NEARNESS,
     depth: float = np.inf,
+    ceilings: Float[Array, " n"] | None = None,
 ) -> RaisedPlaces:
     """Return the candidate contacts of a pair at X_RM (n, 12), see Meeting.at, for deviations (n, contributor).
 
-    Minima of the gap between contact points are among them if they are deeper than `depth` [mm].
+    Minima of the gap between contact points are among them if they are deeper than `depth` [mm]. `ceilings` (n,) [mm] are of
+    gaps between faces that have grown; with form they do not count.
     """
     grown = pair.heights(deviations)[:, None]
     if not pair.has_form:
-        places = meeting.at(X_RM, retained, error, nearness)
+        places = meeting.at(X_RM, retained, error, nearness, None if ceilings is None else ceilings + grown[:, 0])
         return RaisedPlaces(places, np.broadcast_to(grown, places.gaps.shape))
     at_ends = None if retained is None else np.where(retained < FIRST_POINT, retained, -1)
     ends = meeting.at(X_RM, at_ends, error, nearness)

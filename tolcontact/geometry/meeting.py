@@ -21,6 +21,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel, places_kernel
+from tolcontact.geometry.facing_planes import facing_planes, moot_corners
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER, TINY
 from tolcontact.geometry.places import Places
 from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
@@ -28,7 +29,6 @@ from tolcontact.geometry.sorted_candidates import sorted_candidates
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.triangle_mesh import blocks, overlaps
 
-FACING = -0.99  # cosine of the angle between the normals of planes that face each other
 TILT_MARGIN = 0.1  # rad: tilt of candidates in addition to the largest tilt of the body
 MAX_COMPARISONS = 100_000_000  # of corners with facets, and of edges with edges
 MAX_CANDIDATES = 100_000
@@ -84,6 +84,7 @@ class Meeting:
     reach    bounds on the displacement of the bodies from their nominal poses
     size     [mm] of the larger face
     overhang [mm]: largest distance outside its edges at which a contact point counts
+    has_form whether faces have form, so that planes may touch first at any of their corners
     is_free  whether bodies are free, so that no contact point is behind another one
     """
 
@@ -92,6 +93,7 @@ class Meeting:
     candidates: places_kernel.Candidates
     reach: Reach
     size: float
+    has_form: bool = field(kw_only=True)
     overhang: float = field(default=0.0, kw_only=True)
     is_free: bool = field(default=False, kw_only=True)
 
@@ -114,7 +116,8 @@ class Meeting:
         if self.reach.travel > MAX_TRAVEL * self.size:
             return None
         travel, tilt = EXTENSION_FACTOR * self.reach.travel, EXTENSION_FACTOR * (self.reach.tilt + TILT_MARGIN)
-        extended = _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
+        reach = self.reach._replace(travel=travel, tilt=tilt)
+        extended = _meeting(self.moving, self.reference, reach, self.size, has_form=self.has_form)
         return None if extended is None else replace(extended, overhang=self.overhang, is_free=self.is_free)
 
     @property
@@ -148,6 +151,7 @@ class Meeting:
         retained: Int[Array, "n k"] | None = None,
         error: float = 0.0,
         nearness: float = NEARNESS,
+        ceilings: Float[Array, " n"] | None = None,
     ) -> Places:
         """Return the relevant contact points at poses X_RM (n, 12), including the candidates in `retained` (n, k), -1 for none.
 
@@ -155,19 +159,30 @@ class Meeting:
 
         Facing planes count beyond their edges up to an error of `error` [mm], within the distance of a touching point that
         `nearness` states. Steps need this: otherwise a corner that overhangs an edge becomes active and inactive in turn.
+
+        Points of facing planes with gaps above `ceilings` (n,) [mm] may be missing if there are points with smaller gaps.
         """
         beyond = np.flatnonzero(~self.covers(X_RM))
+        ceilings = np.full(len(X_RM), np.inf) if ceilings is None else ceilings
         if beyond.size and self.extended is not None:
-            return self._beyond(beyond, X_RM, retained, error, nearness)
-        return self._near(X_RM, retained, error, nearness)
+            return self._beyond(beyond, X_RM, retained, error, nearness, ceilings)
+        return self._near(X_RM, retained, error, nearness, ceilings)
 
-    def _beyond(self, rows: np.ndarray, X_RM: np.ndarray, retained: np.ndarray | None, error: float, nearness: float) -> Places:
+    def _beyond(
+        self,
+        rows: np.ndarray,
+        X_RM: np.ndarray,
+        retained: np.ndarray | None,
+        error: float,
+        nearness: float,
+        ceilings: np.ndarray,
+    ) -> Places:
         """Return contact points at poses; at some of them, `rows`, the bodies are beyond reach."""
         assert self.extended is not None
         count = len(self)
-        nearby = self._near(X_RM, retained, error, nearness)
+        nearby = self._near(X_RM, retained, error, nearness, ceilings)
         extended_retained = None if retained is None else np.maximum(retained[rows] - count, -1)
-        extended_places = self.extended.at(X_RM[rows], extended_retained, error, nearness)
+        extended_places = self.extended.at(X_RM[rows], extended_retained, error, nearness, ceilings[rows])
         extended_places = extended_places._replace(
             labels=np.where(extended_places.labels >= 0, extended_places.labels + count, -1)
         )
@@ -180,7 +195,9 @@ class Meeting:
             padded.append(values)
         return Places(*padded)
 
-    def _near(self, X_RM: np.ndarray, retained: np.ndarray | None, error: float, nearness: float) -> Places:
+    def _near(
+        self, X_RM: np.ndarray, retained: np.ndarray | None, error: float, nearness: float, ceilings: np.ndarray
+    ) -> Places:
         """Return contact points at poses within reach."""
         width = max(min(len(self), MAX_POINTS), 1)
         shape = (len(X_RM), width)
@@ -189,31 +206,33 @@ class Meeting:
         retained = (
             np.zeros((len(X_RM), 0), dtype=np.int64) if retained is None else np.where(retained < len(self), retained, -1)
         )
-        places_kernel.find(
+        count = places_kernel.find(
             self.moving, self.reference, self.candidates,
             np.array([self.reach.depth, self.reach.height, np.inf if self.is_free else _passed(self.reach, self.size)]),
             kernel.MARGIN * self.size + self.overhang,
             np.array([error, self.reach.depth, nearness, self.overhang]),
-            np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
+            np.ascontiguousarray(X_RM), retained, ceilings, DIRECTIONS, *places,
         )  # fmt: skip
-        return places
+        return Places(*(np.ascontiguousarray(values[:, : max(count, 1)]) for values in places))
 
 
-def meeting(faces: tuple[Surface, Surface], bodies: tuple, reach: Reach) -> Meeting | None:
+def meeting(faces: tuple[Surface, Surface], bodies: tuple, reach: Reach, *, has_form: bool = False) -> Meeting | None:
     """Return where a moving and a reference face can touch; None if they have too many corners and edges to compare.
 
     faces, bodies   in their nominal poses
+    has_form        whether a face has form
     """
     A, B = (polyhedron(face, body) for face, body in zip(faces, bodies, strict=True))
-    return _meeting(A, B, reach, float(max(np.ptp(face.mesh.vertices, axis=0).max() for face in faces)))
+    size = float(max(np.ptp(face.mesh.vertices, axis=0).max() for face in faces))
+    return _meeting(A, B, reach, size, has_form=has_form)
 
 
-def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting | None:
+def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float, *, has_form: bool) -> Meeting | None:
     comparisons = len(A.vertices) * len(B.facets) + len(A.facets) * len(B.vertices) + len(A.edges) * len(B.edges)
     if comparisons > MAX_COMPARISONS:
         return None
     travel, tilt_sine = reach.depth, reach.tilt_sine
-    facing, facets = _facing_planes(A, B, reach, size)
+    facing, facets = facing_planes(A, B, _passed(reach, size), reach.height)
     parts = [
         _on_facets(A, B, facing, travel, tilt_sine, CORNER_ON_FACET),
         _on_facets(B, A, facing.T, travel, tilt_sine, FACET_ON_CORNER),
@@ -222,36 +241,15 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting
     if sum(len(part) for part in parts) > MAX_CANDIDATES:
         return None
     kinds = np.repeat([CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE], [len(part) for part in parts])
-    candidates = sorted_candidates(A, B, np.column_stack([kinds, np.concatenate(parts)]), facets)
-    return Meeting(A, B, candidates, reach, size)
+    table = np.column_stack([kinds, np.concatenate(parts)])
+    if not has_form:
+        table = table[~moot_corners(A, B, facets, table)]
+    return Meeting(A, B, sorted_candidates(A, B, table, facets), reach, size, has_form=has_form)
 
 
 def _passed(reach: Reach, size: float) -> float:
     """Return the nominal depth [mm] beyond which a body cannot have penetrated through a facet, or across an edge."""
     return reach.overlap + kernel.MARGIN * size
-
-
-def _facing_planes(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of facing planes in a table (plane of A + 1, plane of B + 1), -1 for others, and their facets (n, 2).
-
-    The last row and column mean no plane. Only planes count that are nominally near each other and through which the bodies
-    may have penetrated each other: the planes at the ends of a short overlap are already beyond each other.
-    """
-    passed = _passed(reach, size)
-    table, facets = np.full((_plane_count(A) + 1, _plane_count(B) + 1), -1), list[tuple[int, int]]()
-    planes_A, firsts_A = np.unique(A.facet_planes, return_index=True)
-    planes_B, firsts_B = np.unique(B.facet_planes, return_index=True)
-    cosines = A.normals[firsts_A] @ B.normals[firsts_B].T
-    for i, j in np.argwhere(cosines < FACING):
-        heights = (A.facets[A.facet_planes == planes_A[i]] - B.facets[firsts_B[j], 0]) @ B.normals[firsts_B[j]]
-        if heights.max() >= -passed and heights.min() <= reach.height:
-            table[planes_A[i], planes_B[j]] = len(facets)
-            facets.append((int(firsts_A[i]), int(firsts_B[j])))
-    return table, np.array(facets, dtype=np.int64).reshape(-1, 2)
-
-
-def _plane_count(body: Polyhedron) -> int:
-    return int(max(body.facet_planes.max(initial=-1), body.edge_planes.max(initial=-1), body.vertex_planes.max(initial=-1))) + 1
 
 
 def _on_facets(

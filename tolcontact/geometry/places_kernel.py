@@ -44,10 +44,9 @@ class Candidates(NamedTuple):
     The candidates of a corner or edge and one facing plane, or no plane, are a run; runs begin at `runs` (run + 1,). From
     `middles` (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm].
     `boxes` (candidate, 4) [mm] are the smallest and largest coordinates of the facets or the edge that a corner or an edge may
-    touch in a facing plane, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 5) are the outlines
-    of facing planes in these coordinates (see is_within). The outlines of a plane of the moving and of the reference body begin
-    at `outlines` (2 planes + 1,). Their sorted segments begin at `outline_middles`, and are no taller than `tallest` (2
-    planes,).
+    touch in a facing plane, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (row, 4) are the outlines of
+    facing planes in these coordinates, in bands that begin at `bands` (band + 1,) (see is_within). The bands of a plane of the
+    moving and of the reference body begin at `outlines` (2 planes + 1,), and extend over `spans` (2 planes, 2) [mm].
     """
 
     kinds: np.ndarray
@@ -61,9 +60,9 @@ class Candidates(NamedTuple):
     boxes: np.ndarray
     frames: np.ndarray
     segments: np.ndarray
+    bands: np.ndarray
     outlines: np.ndarray
-    outline_middles: np.ndarray
-    tallest: np.ndarray
+    spans: np.ndarray
 
 
 @compiled
@@ -111,9 +110,8 @@ def _is_over_plane(candidates, plane, body, x, slack):  # type: ignore[no-untype
     outline, frames = 2 * plane + body, candidates.frames
     coordinate_1 = frames[plane, body, 0, 0] * x[0] + frames[plane, body, 0, 1] * x[1] + frames[plane, body, 0, 2] * x[2]
     coordinate_2 = frames[plane, body, 1, 0] * x[0] + frames[plane, body, 1, 1] * x[1] + frames[plane, body, 1, 2] * x[2]
-    start, end = candidates.outlines[outline], candidates.outlines[outline + 1]
-    middle, tallest = candidates.outline_middles[outline], candidates.tallest[outline]
-    return is_within(candidates.segments, start, middle, end, tallest, coordinate_1, coordinate_2, slack)
+    first, last, span = candidates.outlines[outline], candidates.outlines[outline + 1], candidates.spans[outline]
+    return is_within(candidates.segments, candidates.bands, first, last, span, coordinate_1, coordinate_2, slack)
 
 
 @inlined_uncounted
@@ -178,8 +176,24 @@ def _range(A, candidates, s, moved, slack):  # type: ignore[no-untyped-def]
     return dot(axis_1, x) - shear, dot(axis_2, x) - shear, dot(axis_1, x) + shear, dot(axis_2, x) + shear
 
 
+@inlined_uncounted
+def _lowest(A, B, candidates, s, moved):  # type: ignore[no-untyped-def]
+    """Return the least gap that the corner or edge of candidate s can have to the plane that faces it."""
+    corners, lines, back, _ = moved
+    kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
+    flat_A, flat_B = candidates.facing[plane, 0], candidates.facing[plane, 1]
+    if kind == FACET_ON_CORNER:  # the gap along the other normal is larger than this distance
+        return dot(row(A.normals, flat_A), minus(row(back, index_B), row_of(A.facets, flat_A, 0)))
+    n, foot = row(B.normals, flat_B), row_of(B.facets, flat_B, 0)
+    if kind == CORNER_ON_FACET:
+        return dot(n, minus(row(corners, index_A), foot))
+    return dot(n, minus(row_of(lines, index_A, 0), foot)) + min(dot(n, row_of(lines, index_A, 1)), 0.0)
+
+
 @uncounted
-def _find_at(A, B, candidates, reach, margins, nearness, overhang, retained, X, moved, touching, is_held, gaps, all_points):  # type: ignore
+def _find_at(
+    A, B, candidates, reach, margins, nearness, overhang, retained, ceiling, X, moved, touching, is_held, gaps, all_points
+):  # type: ignore[no-untyped-def]
     """Write gap, points and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
     Retained candidates of facing planes count slightly outside their edges: near a corner of the overlap the error of the
@@ -189,6 +203,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, overhang, retained, X, 
                   facing planes, and last for all other candidates
     nearness      in margins: largest distance of such a contact point from a point where the planes touch
     retained      (k,): indices of the retained candidates, or -1
+    ceiling       [mm]: candidates of facing planes with larger gaps are left out, unless their edge reaches below it
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
                   corners of the reference body in the moving frame, and whether facing planes are level (see corner_on_facet)
     touching      (c,): indices of the candidates that touch
@@ -201,6 +216,8 @@ def _find_at(A, B, candidates, reach, margins, nearness, overhang, retained, X, 
     for run in range(candidates.widths.size):
         s, middle, end = candidates.runs[run], candidates.middles[run], candidates.runs[run + 1]
         is_flat = candidates.planes[s] >= 0
+        if is_flat and _lowest(A, B, candidates, s, moved) > ceiling:
+            continue
         low, low_2, high, high_2 = _range(A, candidates, s, moved, margin) if is_flat else EVERYWHERE
         while True:
             if s == middle:
@@ -229,20 +246,24 @@ def _find_at(A, B, candidates, reach, margins, nearness, overhang, retained, X, 
 
 @uncounted
 def _choose(touching, gaps, projections, retained, directions, is_chosen, labels):  # type: ignore[no-untyped-def]
-    """Write the labels (p,) of relevant points: retained ones, those with the smallest gaps, and the outermost; -1 for none."""
-    number = 0
+    """Write the labels (p,) of relevant points: retained ones, those with the smallest gaps, and the outermost; -1 for none.
+
+    Return the number of points.
+    """
+    number, count = 0, labels.size - (directions.shape[0] if touching.size > labels.size else 0)
     for s in touching:
         is_chosen[s] = gaps[s] == np.inf
     for s in retained:
         if s >= 0 and gaps[s] < np.inf and not is_chosen[s]:
             labels[number], is_chosen[s], number = s, True, number + 1
-    while number < labels.size - directions.shape[0]:
+    while number < count:
         shallowest, gap = -1, np.inf
         for s in touching:
             if gaps[s] < gap and not is_chosen[s]:
                 shallowest, gap = s, gaps[s]
         if shallowest < 0:
-            break
+            labels[number:] = -1
+            return number
         labels[number], is_chosen[shallowest], number = shallowest, True, number + 1
     for direction in directions:
         outermost, farthest = -1, -np.inf
@@ -254,6 +275,7 @@ def _choose(touching, gaps, projections, retained, directions, is_chosen, labels
         if outermost >= 0 and not is_chosen[outermost]:
             labels[number], is_chosen[outermost], number = outermost, True, number + 1
     labels[number:] = -1
+    return number
 
 
 @uncounted
@@ -273,12 +295,21 @@ def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-unty
 
 
 @uncounted
-def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, directions, results, scratch):  # type: ignore
-    """Write the results of `find`: labels, gaps, points, projections and normals."""
+def _least(touching, gaps):  # type: ignore[no-untyped-def]
+    """Return the smallest gap of candidates that touch; infinite if there are none."""
+    least = np.inf
+    for s in touching:
+        least = min(least, gaps[s])
+    return least
+
+
+@uncounted
+def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, ceilings, directions, results, scratch):  # type: ignore
+    """Write the results of `find`: labels, gaps, points, projections and normals. Return the largest number of points."""
     corners, lines, back, level, margins, touching, is_held, is_chosen, all_gaps, all_points = scratch
     labels, gaps, points, projections, normals = results
     points_at, projections_at, normals_at = all_points
-    count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
+    facing, largest = candidates.facing, 0
     for k in range(poses.shape[0]):
         X = poses[k]
         _move(A, B, facing, X, corners, lines, back, margins)
@@ -287,34 +318,44 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, direc
             level[j] = margins[j] < LEVEL
             margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
         moved = (corners, lines, back, level)
-        number = _find_at(
-            A, B, candidates, reach, margins, error[2], error[3], retained[k], X, moved, touching, is_held, all_gaps, all_points
-        )
-        if count <= room:
-            for p in range(room):
-                labels[k, p] = p if p < count else -1
-        else:
-            _choose(touching[:number], all_gaps, projections_at, retained[k], directions, is_chosen, labels[k])
-        for p in range(room):
+        number, ceiling = 0, ceilings[k]
+        while True:
+            for s in touching[:number]:
+                all_gaps[s] = np.inf
+            number = _find_at(
+                A, B, candidates, reach, margins, error[2], error[3], retained[k], ceiling, X, moved, touching, is_held,
+                all_gaps, all_points,
+            )  # fmt: skip
+            if ceiling == np.inf or _least(touching[:number], all_gaps) <= ceiling:
+                break
+            ceiling = np.inf
+        chosen = _choose(touching[:number], all_gaps, projections_at, retained[k], directions, is_chosen, labels[k])
+        largest = max(largest, chosen)
+        gaps[k, chosen:] = np.inf
+        for p in range(chosen):
             s = labels[k, p]
-            gaps[k, p] = np.inf if s < 0 else all_gaps[s]
-            if gaps[k, p] < np.inf:
-                for i in range(3):
-                    points[k, p, i], projections[k, p, i], normals[k, p, i] = (
-                        points_at[s, i],
-                        projections_at[s, i],
-                        normals_at[s, i],
-                    )
+            gaps[k, p] = all_gaps[s]
+            for i in range(3):
+                points[k, p, i], projections[k, p, i], normals[k, p, i] = (
+                    points_at[s, i],
+                    projections_at[s, i],
+                    normals_at[s, i],
+                )
         for s in touching[:number]:
             all_gaps[s] = np.inf
+    return largest
 
 
 @compiled
-def find(A, B, candidates, reach, margin, error, poses, retained, directions, labels, gaps, points, projections, normals):  # type: ignore
-    """Write the relevant points at which bodies can touch, at poses X_RM (n, 12).
+def find(
+    A, B, candidates, reach, margin, error, poses, retained, ceilings, directions, labels, gaps, points, projections, normals
+):  # type: ignore[no-untyped-def]
+    """Write the relevant points at which bodies can touch, at poses X_RM (n, 12), and return the largest number of points.
 
     First come the candidates in `retained` (n, k), then those with the smallest gaps, then the outermost in each of the
     `directions` (direction, 3). All are written if there is room for them.
+
+    Candidates of facing planes with gaps above `ceilings` (n,) [mm] may be left out, unless all gaps are larger.
 
     A, B          Body, the moving and the reference one
     candidates    Candidates
@@ -337,4 +378,4 @@ def find(A, B, candidates, reach, margin, error, poses, retained, directions, la
         np.full(count, np.inf), np.empty((3, count, 3)),
     )  # fmt: skip
     results = (labels, gaps, points, projections, normals)
-    _find_at_each(A, B, candidates, reach, margin, error, poses, retained, directions, results, scratch)
+    return _find_at_each(A, B, candidates, reach, margin, error, poses, retained, ceilings, directions, results, scratch)

@@ -11,6 +11,9 @@ from tolcontact.geometry.polyhedron import Polyhedron
 from tolcontact.geometry.triangle_mesh import edges
 
 WIDE_SHARE = 1 / 8  # of the whole range: wider intervals come first
+BANDS_PER_SEGMENT = 2  # of an outline
+MAX_BANDS = 1024
+ROUNDING = 1e-9  # bands: segments that end this close to a band are in it
 
 
 class Sorted(NamedTuple):
@@ -48,14 +51,25 @@ def sorted_candidates(A: Polyhedron, B: Polyhedron, table: Int[Array, "c 4"], fa
     owners = np.where(kinds == FACET_ON_CORNER, seconds, firsts)
     by_owner = _sorted(boxes[:, 0], boxes[:, 2], np.stack([kinds, owners, planes]))
     kinds, firsts, seconds, planes = (np.ascontiguousarray(column) for column in table[by_owner.order].T)
-    segments = np.concatenate([np.zeros((0, 2, 2)), *outlines])
-    numbers = np.repeat(np.arange(len(outlines)), [len(outline) for outline in outlines])
-    y = segments[:, :, 1]
-    by_outline = _sorted(y.min(axis=1), y.max(axis=1), numbers[None])
-    rows = np.column_stack([y.min(axis=1), segments.reshape(-1, 4)])[by_outline.order]
     return Candidates(
-        kinds, firsts, seconds, planes, facing, *by_owner[1:], boxes[by_owner.order], frames, rows, *by_outline[1:]
+        kinds, firsts, seconds, planes, facing, *by_owner[1:], boxes[by_owner.order], frames, *_in_bands(outlines)
     )
+
+
+def _in_bands(outlines: list[Float[Array, "segment 2 2"]]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the segments (row, 4) of outlines in bands, where bands and outlines begin, and the spans of the outlines."""
+    rows, bands, numbers = [np.zeros((0, 4))], [0], [0]
+    spans = np.array([[outline[..., 1].min(), outline[..., 1].max()] for outline in outlines]).reshape(-1, 2)
+    for outline, (low, high) in zip(outlines, spans, strict=True):
+        count = min(BANDS_PER_SEGMENT * len(outline), MAX_BANDS)
+        heights = (outline[..., 1] - low) * count / (high - low)
+        bottom, top = np.floor(heights.min(axis=1) - ROUNDING), np.floor(heights.max(axis=1) + ROUNDING)
+        for band in range(count):
+            reaching = outline[(bottom <= band) & (top >= band)].reshape(-1, 4)
+            rows.append(reaching)
+            bands.append(bands[-1] + len(reaching))
+        numbers.append(numbers[-1] + count)
+    return np.concatenate(rows), np.array(bands), np.array(numbers), spans
 
 
 def _sorted(lows: Float[Array, " n"], highs: Float[Array, " n"], keys: Int[Array, "key n"]) -> Sorted:

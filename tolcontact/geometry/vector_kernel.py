@@ -101,28 +101,32 @@ def first_from(values, start, end, least):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def is_within(segments, start, middle, end, tallest, x, y, spare):  # type: ignore[no-untyped-def]
+def is_within(segments, bands, first, last, span, x, y, spare):  # type: ignore[no-untyped-def]
     """Return whether (x, y) lies inside an outline, or outside it by no more than `spare`.
 
-    The outline is rows start to end of `segments` (segment, 5): least y, then x and y of both ends. From row `middle` they are
-    sorted, and none of them is taller than `tallest`.
+    The outline is cut into bands of equal height along y, from `span[0]` to `span[1]`. Bands `first` to `last` belong to it;
+    rows bands[k] to bands[k + 1] of `segments` (row, 4), with x and y of both ends, reach into band k.
     """
-    inside, k = False, start
-    while True:
-        if k == middle:
-            k = first_from(segments, middle, end, y - spare - tallest)
-        if k >= end or (k >= middle and segments[k, 0] > y + spare):
-            return inside
-        x0, y0, x1, y1 = segments[k, 1], segments[k, 2], segments[k, 3], segments[k, 4]
-        if (y0 > y) != (y1 > y) and x < x0 + (x1 - x0) * (y - y0) / (y1 - y0):
-            inside = not inside
-        if not (min(x0, x1) > x + spare or max(x0, x1) < x - spare or max(y0, y1) < y - spare):
-            dx, dy = x1 - x0, y1 - y0
-            share = min(max(((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy), 0.0), 1.0)
-            aside_x, aside_y = x - x0 - share * dx, y - y0 - share * dy
-            if aside_x * aside_x + aside_y * aside_y <= spare * spare:
-                return True
-        k += 1
+    low, high = span[0], span[1]
+    if not (low - spare <= y <= high + spare):
+        return False
+    rate = (last - first) / (high - low)
+    own = first + math.floor((y - low) * rate)
+    start = max(first + math.floor((y - spare - low) * rate), first)
+    end = min(first + math.floor((y + spare - low) * rate), last - 1)
+    inside = False
+    for band in range(start, end + 1):
+        for k in range(bands[band], bands[band + 1]):
+            x0, y0, x1, y1 = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
+            if band == own and (y0 > y) != (y1 > y) and x < x0 + (x1 - x0) * (y - y0) / (y1 - y0):
+                inside = not inside
+            if not (min(x0, x1) > x + spare or max(x0, x1) < x - spare or max(y0, y1) < y - spare or min(y0, y1) > y + spare):
+                dx, dy = x1 - x0, y1 - y0
+                share = min(max(((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy), 0.0), 1.0)
+                aside_x, aside_y = x - x0 - share * dx, y - y0 - share * dy
+                if aside_x * aside_x + aside_y * aside_y <= spare * spare:
+                    return True
+    return inside
 
 
 @inlined_uncounted
