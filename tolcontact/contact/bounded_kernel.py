@@ -29,8 +29,8 @@ def gaps(relative, places, feet, normals, heights, valid, values):  # type: igno
 def deepest(relative, labels, places, feet, normals, heights, valid, distance, numbers, depths):  # type: ignore[no-untyped-def]
     """Write labels and depths of the deepest places (n, m) at X_RM (n, 12), deepest first.
 
-    Where there are fewer places, it writes some label, and -inf. Places outside within a `distance` [mm] of a deeper one are left out: of two that nearly coincide, either could be active,
-    and the choice should not be left to the solver.
+    Where there are fewer places, it writes some label, and -inf. Places outside within a `distance` [mm] of a deeper one are
+    left out: of two that nearly coincide, either could be active, and the choice should not be left to the solver.
     """
     for k in range(labels.shape[0]):
         count = 0

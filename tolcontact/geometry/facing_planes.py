@@ -20,7 +20,7 @@ def facing_planes(A: Polyhedron, B: Polyhedron, passed: float, height: float) ->
 
     passed, height   [mm]: the largest depth and the largest gap of planes that face each other
     """
-    table, facets = np.full((plane_count(A) + 1, plane_count(B) + 1), -1), list[tuple[int, int]]()
+    table, facets = np.full((_plane_count(A) + 1, _plane_count(B) + 1), -1), list[tuple[int, int]]()
     planes_A, firsts_A = np.unique(A.facet_planes, return_index=True)
     planes_B, firsts_B = np.unique(B.facet_planes, return_index=True)
     cosines = A.normals[firsts_A] @ B.normals[firsts_B].T
@@ -32,7 +32,7 @@ def facing_planes(A: Polyhedron, B: Polyhedron, passed: float, height: float) ->
     return table, np.array(facets, dtype=np.int64).reshape(-1, 2)
 
 
-def plane_count(body: Polyhedron) -> int:
+def _plane_count(body: Polyhedron) -> int:
     """Return how many indices of planes a body has."""
     return int(max(body.facet_planes.max(initial=-1), body.edge_planes.max(initial=-1), body.vertex_planes.max(initial=-1))) + 1
 
