@@ -3,10 +3,10 @@
 .. include:: ../guide/compilation.md
 """
 
-from tolcontact.compilation.contact_rows import SLOTS
+from tolcontact.compilation.contact_rows import MANY_SLOTS
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.program import ContactGroup, Program, compile_program
 from tolcontact.compilation.solver import ACCURACY
 from tolcontact.compilation.solvers import usable_solvers
 
-__all__ = ["ACCURACY", "SLOTS", "ContactGroup", "NamedFunction", "Program", "compile_program", "usable_solvers"]
+__all__ = ["ACCURACY", "MANY_SLOTS", "ContactGroup", "NamedFunction", "Program", "compile_program", "usable_solvers"]

@@ -38,13 +38,12 @@ PLANES_FACTOR = 3.0  # times the error that a trial allows: allowed penetration 
 class Trial(NamedTuple):
     """The trial of a pair: the largest error of its fixed planes in the depth of contact, and the allowed error, both [mm].
 
-    `max_points` is the largest number of points at which its faces could touch. Errors are NaN for a pair without a choice: a
-    one-sided locator, round faces, springs, unbounded tolerances, or too many edges.
+    Errors are NaN for a pair without a choice: a one-sided locator, round faces, springs, unbounded tolerances, or too many
+    edges.
     """
 
     error: float
     allowed: float
-    max_points: int = 0
 
 
 def bounded_pairs(
@@ -131,11 +130,11 @@ def _bounded_pair(
             stacklevel=2,
         )
         return nothing
-    error, max_points = _error_of_planes(pair, pair_meeting, X_RM, deviations, room)
+    error = _error_of_planes(pair, pair_meeting, X_RM, deviations, room)
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
     represents_curves = FACET_FACTOR * bulge <= COARSE_SHARE * smallest
     allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if represents_curves else 0.0)
-    trial = Trial(error, allowed, max_points)
+    trial = Trial(error, allowed)
     return (pair_meeting if trial.error > trial.allowed else None), trial
 
 
@@ -159,21 +158,19 @@ def _check_corners(nominal: Nominal, pair: ContactPoints, pair_meeting: Meeting)
 
 def _error_of_planes(
     pair: ContactPoints, pair_meeting: Meeting, X_RM: np.ndarray, deviations: np.ndarray, room: float
-) -> tuple[float, int]:
-    """Return the largest error [mm] of the fixed planes in the depth of contact, and the largest number of contact points."""
+) -> float:
+    """Return the largest error [mm] of the fixed planes in the depth of contact."""
     fixed = pair.least_gap(X_RM, deviations)
     room = max(room, float(np.ptp(fixed)))  # poses that are rarer than in the trial may be deeper by this range
 
-    def compared(rows: slice) -> tuple[float, int]:
-        gaps = raised_places(pair, pair_meeting, X_RM[rows], deviations[rows]).gaps
-        bounded = gaps.min(axis=1, initial=np.inf)
+    def compared(rows: slice) -> float:
+        bounded = raised_places(pair, pair_meeting, X_RM[rows], deviations[rows]).gaps.min(axis=1, initial=np.inf)
         differences = np.minimum(bounded, room) - np.minimum(fixed[rows], room)
-        return float(np.abs(differences).max(initial=0)), int(np.isfinite(gaps).sum(axis=1).max())
+        return float(np.abs(differences).max(initial=0))
 
     blocks = [slice(k, k + POSES_AT_ONCE) for k in range(0, len(X_RM), POSES_AT_ONCE)]
     with ThreadPoolExecutor(THREADS) as pool:
-        errors, counts = zip((0.0, 0), *pool.map(compared, blocks), strict=True)
-    return max(errors), max(counts)
+        return max(pool.map(compared, blocks), default=0.0)
 
 
 def _travel(pair: ContactPoints, X_RM: np.ndarray) -> float:

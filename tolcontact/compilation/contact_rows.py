@@ -16,7 +16,7 @@ from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.method import Method
 
-SLOTS, MIN_SLOTS = 12, 8  # largest and smallest number of slots of a pair; at most six independent rows can be active
+SLOTS, MANY_SLOTS = 8, 12  # of a pair of bounded faces, and of others; at most six independent rows can be active
 
 Point = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # P^m, P^r, n^r, and 1 if it has a row
 
@@ -96,8 +96,8 @@ def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) ->
     """
     if gaps is None or pair.is_springy:
         return np.arange(len(pair.P_m))
-    are_few = method.is_closed and len(gaps.corners) <= SLOTS and pair.minima is None
-    return gaps.corners if are_few else SLOTS
+    are_few = method.is_closed and len(gaps.corners) <= MANY_SLOTS and pair.minima is None
+    return gaps.corners if are_few else MANY_SLOTS
 
 
 def contact_rows(

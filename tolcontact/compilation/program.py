@@ -10,7 +10,7 @@ import numpy as np
 
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, Trial, allowed_depths, bounded_pairs
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp, row_count
-from tolcontact.compilation.contact_rows import MIN_SLOTS, SLOTS, standing_points
+from tolcontact.compilation.contact_rows import MANY_SLOTS, SLOTS, standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.measure_accuracy import measure_accuracies
@@ -256,4 +256,4 @@ def _rows(pair: ContactPoints, gaps: GapMap | None, trial: Trial | None, method:
     """
     if trial is None:
         return standing_points(pair, gaps, method)
-    return min(max(trial.max_points, MIN_SLOTS), SLOTS)
+    return MANY_SLOTS if pair.has_form else SLOTS

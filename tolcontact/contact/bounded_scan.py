@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.compilation import SLOTS
+from tolcontact.compilation import MANY_SLOTS
 from tolcontact.contact import bounded_kernel
 from tolcontact.contact.guard import PARTING, Guard, is_guard, no_places
 from tolcontact.contact.scan import PENETRATION, Deepest, Scan
@@ -17,7 +17,7 @@ from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting
 from tolcontact.geometry.places import RaisedPlaces, unraised
 
-MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
+MAX_DEEPEST = MANY_SLOTS  # places of a pair that get a row in one round
 ALIGNED = 0.87  # cosine of the largest angle between the axis of separation and the normal of a penetrating place that counts
 SHOWN_SHARE = 0.05  # of the gap along this axis: no place is added if another place shows the gap to within this share
 
