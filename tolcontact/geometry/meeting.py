@@ -244,7 +244,7 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float, *, has_for
     table = np.column_stack([kinds, np.concatenate(parts)])
     if not has_form:
         table = table[~moot_corners(A, B, facets, table)]
-    return Meeting(A, B, sorted_candidates(A, B, table, facets), reach, size, has_form=has_form)
+    return Meeting(A, B, sorted_candidates(A, B, table, facets, has_form=has_form), reach, size, has_form=has_form)
 
 
 def _passed(reach: Reach, size: float) -> float:

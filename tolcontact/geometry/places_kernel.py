@@ -42,7 +42,9 @@ class Candidates(NamedTuple):
     """The points at which two bodies can touch (see Meeting), grouped by the corner or edge of one body.
 
     The candidates of a corner or edge and one facing plane, or no plane, are a run; runs begin at `runs` (run + 1,). From
-    `middles` (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm].
+    `middles` (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm]. Runs
+    at holes do not matter before bodies move by `clearances` (run,) [mm] from their nominal poses; this is 0 for other runs.
+    `ball` (4,) [mm] is the centre and radius of a ball around the moving corners.
     `boxes` (candidate, 4) [mm] are the smallest and largest coordinates of the facets or the edge that a corner or an edge may
     touch in a facing plane, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (row, 4) are the outlines of
     facing planes in these coordinates, in bands that begin at `bands` (band + 1,) (see is_within). The bands of a plane of the
@@ -57,6 +59,8 @@ class Candidates(NamedTuple):
     runs: np.ndarray
     middles: np.ndarray
     widths: np.ndarray
+    clearances: np.ndarray
+    ball: np.ndarray
     boxes: np.ndarray
     frames: np.ndarray
     segments: np.ndarray
@@ -190,6 +194,16 @@ def _lowest(A, B, candidates, s, moved):  # type: ignore[no-untyped-def]
     return dot(n, minus(row_of(lines, index_A, 0), foot)) + min(dot(n, row_of(lines, index_A, 1)), 0.0)
 
 
+@inlined_uncounted
+def _motion(ball, X):  # type: ignore[no-untyped-def]
+    """Return a bound on the motion [mm] of the points in a ball at a pose X_RM (12,) from their nominal places."""
+    centre, square = (ball[0], ball[1], ball[2]), 0.0
+    for i in range(9):
+        square += (X[i] - (1.0 if i % 4 == 0 else 0.0)) ** 2
+    motion = minus(move(X, centre), centre)
+    return math.sqrt(dot(motion, motion)) + math.sqrt(square) * ball[3]
+
+
 @uncounted
 def _find_at(
     A, B, candidates, reach, margins, nearness, overhang, retained, ceiling, X, moved, touching, is_held, gaps, all_points
@@ -212,11 +226,11 @@ def _find_at(
     all_points    points, projections, normals (3, c, 3): P^m, P^r, n^r of the paper
     """
     (points, projections, normals), margin, boxes = all_points, margins[-1], candidates.boxes
-    count = 0
+    count, motion = 0, _motion(candidates.ball, X)
     for run in range(candidates.widths.size):
         s, middle, end = candidates.runs[run], candidates.middles[run], candidates.runs[run + 1]
         is_flat = candidates.planes[s] >= 0
-        if is_flat and _lowest(A, B, candidates, s, moved) > ceiling:
+        if is_flat and (motion < candidates.clearances[run] or _lowest(A, B, candidates, s, moved) > ceiling):
             continue
         low, low_2, high, high_2 = _range(A, candidates, s, moved, margin) if is_flat else EVERYWHERE
         while True:

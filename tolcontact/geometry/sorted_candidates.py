@@ -6,11 +6,12 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
+from tolcontact.geometry.outlines import across, hole_clearances, outline
 from tolcontact.geometry.places_kernel import Candidates
 from tolcontact.geometry.polyhedron import Polyhedron
-from tolcontact.geometry.triangle_mesh import edges
 
 WIDE_SHARE = 1 / 8  # of the whole range: wider intervals come first
+CLEARANCE_SHARE = 0.5  # of the distance of a hole from other outlines: bodies move by less, with room for their tilt
 BANDS_PER_SEGMENT = 2  # of an outline
 MAX_BANDS = 1024
 ROUNDING = 1e-9  # bands: segments that end this close to a band are in it
@@ -31,12 +32,14 @@ class Sorted(NamedTuple):
     widths: Float[Array, " run"]
 
 
-def sorted_candidates(A: Polyhedron, B: Polyhedron, table: Int[Array, "c 4"], facing: Int[Array, "p 2"]) -> Candidates:
+def sorted_candidates(
+    A: Polyhedron, B: Polyhedron, table: Int[Array, "c 4"], facing: Int[Array, "p 2"], *, has_form: bool
+) -> Candidates:
     """Return candidates (kind, first, second, plane), grouped by corner or edge and plane."""
     kinds, firsts, seconds, planes = table.T
-    frames = np.array([[_across(body.normals[k]) for body, k in zip((A, B), facets, strict=True)] for facets in facing])
+    frames = np.array([[across(body.normals[k]) for body, k in zip((A, B), facets, strict=True)] for facets in facing])
     frames = frames.reshape(-1, 2, 2, 3)
-    outlines = [_outline(body, k) @ frame.T for facets, body_frames in zip(facing, frames, strict=True)
+    outlines = [outline(body, k) @ frame.T for facets, body_frames in zip(facing, frames, strict=True)
                 for body, k, frame in zip((A, B), facets, body_frames, strict=True)]  # fmt: skip
     boxes = np.tile([-np.inf, -np.inf, np.inf, np.inf], (len(table), 1))
     for plane in range(len(facing)):
@@ -51,21 +54,28 @@ def sorted_candidates(A: Polyhedron, B: Polyhedron, table: Int[Array, "c 4"], fa
     owners = np.where(kinds == FACET_ON_CORNER, seconds, firsts)
     by_owner = _sorted(boxes[:, 0], boxes[:, 2], np.stack([kinds, owners, planes]))
     kinds, firsts, seconds, planes = (np.ascontiguousarray(column) for column in table[by_owner.order].T)
+    leaders = by_owner.runs[:-1]
+    is_edge = (kinds[leaders] == EDGE_ON_EDGE) & (planes[leaders] >= 0) & (not has_form)
+    clearances = np.zeros(len(leaders))
+    clearances[is_edge] = hole_clearances(A, B, facing)[firsts[leaders[is_edge]], planes[leaders[is_edge]]]
+    centre = A.vertices.mean(axis=0)
+    ball = np.append(centre, np.linalg.norm(A.vertices - centre, axis=1).max())
     return Candidates(
-        kinds, firsts, seconds, planes, facing, *by_owner[1:], boxes[by_owner.order], frames, *_in_bands(outlines)
-    )
+        kinds, firsts, seconds, planes, facing, *by_owner[1:], CLEARANCE_SHARE * clearances, ball,
+        boxes[by_owner.order], frames, *_in_bands(outlines),
+    )  # fmt: skip
 
 
 def _in_bands(outlines: list[Float[Array, "segment 2 2"]]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the segments (row, 4) of outlines in bands, where bands and outlines begin, and the spans of the outlines."""
     rows, bands, numbers = [np.zeros((0, 4))], [0], [0]
-    spans = np.array([[outline[..., 1].min(), outline[..., 1].max()] for outline in outlines]).reshape(-1, 2)
-    for outline, (low, high) in zip(outlines, spans, strict=True):
-        count = min(BANDS_PER_SEGMENT * len(outline), MAX_BANDS)
-        heights = (outline[..., 1] - low) * count / (high - low)
+    spans = np.array([[segments[..., 1].min(), segments[..., 1].max()] for segments in outlines]).reshape(-1, 2)
+    for segments, (low, high) in zip(outlines, spans, strict=True):
+        count = min(BANDS_PER_SEGMENT * len(segments), MAX_BANDS)
+        heights = (segments[..., 1] - low) * count / (high - low)
         bottom, top = np.floor(heights.min(axis=1) - ROUNDING), np.floor(heights.max(axis=1) + ROUNDING)
         for band in range(count):
-            reaching = outline[(bottom <= band) & (top >= band)].reshape(-1, 4)
+            reaching = segments[(bottom <= band) & (top >= band)].reshape(-1, 4)
             rows.append(reaching)
             bands.append(bands[-1] + len(reaching))
         numbers.append(numbers[-1] + count)
@@ -92,18 +102,3 @@ def _sorted(lows: Float[Array, " n"], highs: Float[Array, " n"], keys: Int[Array
     lengths, wide = np.bincount(run, minlength=count), np.bincount(run[is_wide], minlength=count)
     runs = np.concatenate([[0], np.cumsum(lengths)])
     return Sorted(np.lexsort((lows, ~is_wide, run)), runs, runs[:-1] + wide, narrowest)
-
-
-def _outline(body: Polyhedron, facet: int) -> Float[Array, "segment 2 3"]:
-    """Return the outline of the face's facets in the plane of a facet: the edges that belong to only one of them."""
-    triangles = body.facets[body.facet_planes == body.facet_planes[facet]]
-    corners, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    ends, edge, count = edges(numbers.reshape(-1, 3))
-    return np.asarray(corners[ends[count[edge] == 1]])
-
-
-def _across(normal: Float[Array, "3"]) -> Float[Array, "2 3"]:
-    """Return two unit vectors across a normal."""
-    direction = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    direction /= np.linalg.norm(direction)
-    return np.stack([direction, np.cross(normal, direction)])
