@@ -55,14 +55,28 @@ def test_the_least_gap_is_that_of_the_overlap_wherever_the_holes_are(seed, far):
         assert np.abs(gaps - expected).max() < 1e-5  # the library's solids have 32 bits
 
 
-def test_a_hole_that_reaches_an_outline_counts_wherever_bodies_are():
-    plates = [trimesh.creation.box(bounds=[(-30, -20, low), (30, 20, low + 10)]) for low in (0, -10)]
-    cut = [trimesh.creation.cylinder(4, 40, sections=12).apply_translation((x, 0, 0)) for x in (0, 24, 28)]
-    upper = trimesh.boolean.difference([plates[0], *cut[:2]], engine="manifold")
-    lower = trimesh.boolean.difference([plates[1], cut[2]], engine="manifold")
-    found = between(upper, lower)
+def drilled(width: float, places: list[float], *, up: bool) -> trimesh.Trimesh:
+    """Return a plate up to x = width, with holes of radius 4 at y = 8."""
+    low = 0.0 if up else -THICKNESS
+    box = trimesh.creation.box(bounds=[(-30, -20, low), (width, 20, low + THICKNESS)])
+    holes = [trimesh.creation.cylinder(4, 40, sections=12).apply_translation((x, 8, 0)) for x in places]
+    return trimesh.boolean.difference([box, *holes], engine="manifold") if holes else box
+
+
+def test_a_hole_counts_where_it_holds_a_corner_of_the_other_plate():
+    upper, lower = drilled(30, [20], up=True), drilled(30, [], up=False)
+    t = np.array([9.0, 11.0, 0.0])  # the corner is in the middle of the hole
+    R = Rotation.from_rotvec([-0.02, 0.02, 0.0]).as_matrix()  # and is the lowest one
+    square = manifold3d.CrossSection.square((60, 40), center=True)
+    hole = manifold3d.CrossSection([4 * np.column_stack([np.cos(a := np.arange(12) * np.pi / 6), np.sin(a)]) + [20, 8]])
+    expected, corner = least_gap(square - hole, square, R, t), least_gap(square, square, R, t)
+    assert expected > corner + 0.05
+    assert between(upper, lower).at(np.r_[R.ravel(), t][None]).gaps.min() == pytest.approx(expected, abs=1e-5)
+
+
+def test_a_hole_that_meets_an_outline_counts_wherever_bodies_are():
+    found = between(drilled(27, [0, 20], up=True), drilled(30, [25], up=False))
     clearances = hole_clearances(found.moving, found.reference, found.candidates.facing)[:, 0]
-    centre = found.moving.edges.mean(axis=1)
-    around = np.hypot(*(centre[:, :2]).T) < 5
-    assert (clearances[around] > 10).all() and around.any()
-    assert not clearances[~around].any()  # that at x = 24 meets the hole of the other plate, which meets its rim
+    around = np.hypot(*(found.moving.edges.mean(axis=1)[:, :2] - [0, 8]).T) < 5
+    assert around.any() and clearances[around] == pytest.approx(8, abs=1e-9)  # from its own outline
+    assert not clearances[~around].any()  # the hole at x = 20 meets one of the other plate, which meets the rim at x = 27
