@@ -83,6 +83,7 @@ def test_poses_and_reactions_are_those_of_plugins(tmp_path, scene, plugin):
     """
     for qp, answers in steps(SCENES[scene](tmp_path), 6):
         plain = ContactSolver(qp, replace(SOLVERS[plugin], fallbacks=(), remembers=False))
+        plain._polish = lambda _, solution: solution  # nothing but the plugin
         for arrays, answer in answers:
             expected = plain(**arrays)
             assert expected["residual"].max() < ACCURACY and not expected["second"].any()  # by nothing but the plugin
