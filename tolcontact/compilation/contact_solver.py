@@ -147,7 +147,7 @@ class ContactSolver:
         return outputs, predicted
 
     def _polished(self, inputs: Arrays, problem: Arrays, solution: Arrays, failed: Bool[Array, " realization"]) -> Arrays:
-        """Return the outputs for a solver's solutions. Rough ones are polished, and all of elastic parts: stiffness amplifies."""
+        """Return the outputs for a solver's solutions. Rough ones are polished, and all of elastic parts."""
         outputs = self._finished(inputs | problem | solution)
         outputs["residual"][failed] = np.inf
         if "opened" in solution:  # of the kernel itself
