@@ -11,6 +11,7 @@ import tolcontact as tc
 from tests.cases import MODELS, elastic as cases
 from tests.helpers import assembly_of, compiled, nightly
 from tolcontact.compilation import ACCURACY
+from tolcontact.errors import NominalWarning
 from tolcontact.simulation import simulate_block
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 from tolcontact.vocabulary import CORRECTED, Status
@@ -231,3 +232,12 @@ def test_the_model_of_welded_sheets_varies_less_once_it_is_released():
     assert (block.status == Status.RESOLVED).all()
     clamped, released = block.measured[:, CORRECTED].std(axis=0)
     assert released < 0.8 * clamped
+
+
+def test_a_tolerance_of_a_welded_sheet_that_nothing_depends_on_is_named(tmp_path):
+    """Gaps that welds keep are inputs after the deviations, and no columns of a tolerance."""
+    model = cases.welded_sheets(tmp_path)
+    rear = model.parts[1]
+    rear.feature("top", rear.face("+z"), tc.Flatness(0.1))
+    with pytest.warns(NominalWarning, match='part "rear": feature "top" .*: its tolerances have no effect'):
+        tc.build(model)

@@ -56,12 +56,9 @@ STUDIES = {
     "verification/parts.py": ["--repetitions", "2", "--samples", "200"],
     "verification/rare.py": ["--seeds", "1", "--samples", "30000", "--only", "two ways", "does not fit"],
 }
-UNCOMPARED = (
-    "cluster.py: cluster",
-    "measure.py: cost",
-    "measure.py: set_up",
-    "solvers.py: solvers",
-)  # times, solvers of other packages
+UNCOMPARED = (  # times, solvers of other packages, fewer draws
+    *("cluster.py: cluster", "measure.py: cost", "measure.py: set_up", "measure.py: whole", "solvers.py: solvers"),
+)
 EXTRAS = {
     "elastic/measure.py": ["ngsolve"],
     "elastic/set_up.py": ["ngsolve"],
