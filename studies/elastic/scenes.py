@@ -43,8 +43,8 @@ def welded_sheets(rows: int, folder: Path) -> tc.Assembly:
     free = [place for place in grid if place not in sheets.WELDS and 250 < place[0] < 300 and 0 < place[1] < 200]
     surplus = len(grid) + WELD_ROWS - rows
     left_out = [free[k] for k in np.linspace(0, len(free) - 1, surplus).astype(int)]
-    sheets.FOLDER, sheets.CELLS = folder / str(rows), (6 * (columns - 1), lines - 1, 1)
-    sheets.FLANGE = [place for place in grid if place not in left_out]
+    flange = [place for place in grid if place not in left_out]
+    vars(sheets).update(FOLDER=folder / str(rows), CELLS=(6 * (columns - 1), lines - 1, 1), FLANGE=flange)
     model = sheets.assembly()
     assert isinstance(model, tc.Assembly)
     return model

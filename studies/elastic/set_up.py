@@ -48,7 +48,7 @@ def build(points: int) -> dict[str, float]:
 
 def set_up(points: int) -> Table:
     """Return the cost of set-up, in a new cache folder with the kernels that Numba has compiled, and then again."""
-    table: Table = [["cache", "imports s", "set-up s", "its child processes s", "on the clock s", "memory MB, of it imports"]]
+    table = [["cache", "imports s", "set-up s", "its child processes s", "on the clock s", "memory MB, of it imports"]]
     kernels = platformdirs.user_cache_path("tolcontact", appauthor=False) / "numba"
     with tempfile.TemporaryDirectory() as folder:
         cache = Path(folder) / "tolcontact"
