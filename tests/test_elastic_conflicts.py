@@ -12,6 +12,7 @@ from tests.cases import elastic as cases
 from tests.helpers import compiled, nightly, simulate
 from tests.test_elastic_parts import tips
 from tolcontact.errors import ModelError, NominalWarning
+from tolcontact.simulation import simulate_block
 from tolcontact.testing import assert_gaps_recompute
 from tolcontact.vocabulary import CERTIFIED, CORRECTED, Status
 
@@ -85,6 +86,19 @@ def test_a_stop_that_cannot_be_passed_is_not_assemblable_and_named(tmp_path, sol
     assert names_in_conflict(program, run) == {frozenset(["supports of beam", *(() if one_sided else ("beam.L2",))])}
     left = -run["gap_min"][overlaps, CORRECTED].min(axis=1)  # both open by half of what they overlap
     assert left == pytest.approx((foot + stop)[overlaps] / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize("solver", ["qpoases", "graph", *nightly("daqp", "piqp")])
+def test_blocks_and_threads_change_no_bit_where_rows_contradict_each_other(tmp_path, solver):
+    program = compiled(beam(tmp_path, range(6), *SIDES, ((200, 0, 0), "-z", True), one_sided=True), solver=solver)
+    (whole,) = tc.simulate_blocks(program, samples=24, seed=3, threads=1)
+    (again,) = tc.simulate_blocks(program, samples=24, seed=3, threads=2)
+    assert len(np.unique(whole.status)) > 1 and (whole.status == Status.NOT_ASSEMBLABLE).any()
+    deviations = program.draws(seed=3, start=0, stop=24)
+    blocks = [(rows, simulate_block(program, deviations[rows])) for rows in (slice(0, 7), slice(7, 24), slice(11, 12))]
+    for rows, part in [(slice(0, 24), again), *blocks]:
+        for name in ("measured", "poses", "load", "gap_min", "kkt_residual", "second_answers"):
+            assert (getattr(part, name) == getattr(whole, name)[rows]).all(), name
 
 
 def test_conflicts_of_a_beam_do_not_depend_on_its_place_and_are_recomputed(tmp_path):

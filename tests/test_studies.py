@@ -34,7 +34,8 @@ STUDIES = {
     "cost/solvers.py": ["--realizations", "2", "--to", "."],
     "drawings/rules.py": ["--to", "."],
     "drawings/six.py": ["--samples", "40", "--to", "."],
-    "elastic/measure.py": ["--realizations", "5", "--rows", "38", "--to", "."],
+    "elastic/measure.py": ["--realizations", "5", "--rows", "38", "--sheets", "83", "--draws", "1", "--to", "."],
+    "elastic/set_up.py": ["38"],
     "exact/tables.py": ["--samples", "300", "--to", "."],
     "form/measure.py": ["--samples", "20", "--to", "."],
     "objectives/measure.py": ["--samples", "20", "--models", "ra1", "lid", "--to", "."],
@@ -55,9 +56,12 @@ STUDIES = {
     "verification/parts.py": ["--repetitions", "2", "--samples", "200"],
     "verification/rare.py": ["--seeds", "1", "--samples", "30000", "--only", "two ways", "does not fit"],
 }
-UNCOMPARED = ("cluster.py: cluster", "measure.py: cost", "solvers.py: solvers")  # times, solvers of other packages
+UNCOMPARED = (  # times, solvers of other packages, fewer draws
+    *("cluster.py: cluster", "measure.py: cost", "measure.py: set_up", "measure.py: whole", "solvers.py: solvers"),
+)
 EXTRAS = {
     "elastic/measure.py": ["ngsolve"],
+    "elastic/set_up.py": ["ngsolve"],
     "benchmarks/others.py": ["openturns", "otaf", "SALib"],
     "cost/solvers.py": ["qpsolvers"],
     "report/picture.py": ["playwright"],

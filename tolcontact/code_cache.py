@@ -12,6 +12,7 @@ import stat
 import tempfile
 from pathlib import Path
 
+import numpy as np
 import platformdirs
 
 from tolcontact.system import files
@@ -64,6 +65,12 @@ def write(key: str, data: bytes) -> bool:
             raise
         return True
     return False
+
+
+def digest(*contents: np.ndarray | bytes) -> str:
+    """Return a digest of arrays and bytes."""
+    pieces = (content.tobytes() if isinstance(content, np.ndarray) else content for content in contents)
+    return hashlib.blake2b(b"".join(hashlib.blake2b(piece).digest() for piece in pieces), digest_size=16).hexdigest()
 
 
 def cache_folder() -> Path:

@@ -1,12 +1,13 @@
-"""Elastic parts: accuracy by element size, the message of the rule for thin sheets, and cost by number of contact rows.
+"""Elastic parts: accuracy by element size, thin sheets, whole meshes, cost by number of contact rows, and set-up.
 
-    python -m studies.elastic.measure [--realizations 1000] [--rows 38 81 153 500] [--to FOLDER]
+    python -m studies.elastic.measure [--realizations 1000] [--rows 38 81 153 500] [--draws 20] [--to FOLDER]
 
 It writes the tables of README.md. It needs the extra `elastic`.
 """
 
 import argparse
 import statistics
+import tempfile
 import time
 import warnings
 from collections.abc import Sequence
@@ -16,16 +17,20 @@ import numpy as np
 import trimesh
 
 import tolcontact as tc
+from studies.elastic.scenes import GRIDS, bolted_cover, welded_sheets
+from studies.elastic.set_up import set_up as set_up_cover
+from studies.elastic.whole import whole_parts
 from studies.tables import Table, write
 from tolcontact import elasticity
 from tolcontact.errors import GeometryFault, NominalWarning
+from tolcontact.simulation import Block
 
 HERE = Path(__file__).resolve().parent
 E, DENSITY, GRAVITY = 210e3, 7850.0, 9.81
 PAD = 1.5  # mm: small, so that little of the error is that forces are spread
 SIZES = (5.0, 4.0, 2.5)  # of elements, in thicknesses
 LENGTHS = (60.0, 200.0)  # of clamped sheets, 1 mm thick
-SOLVERS, LARGEST, TURNS = ("graph", "daqp"), {"graph": 1000, "daqp": 200}, 5  # rows at most
+SOLVERS, LARGEST, TURNS = ("graph", "qpoases", "daqp"), {"graph": 1000, "qpoases": 200, "daqp": 200}, 5  # rows at most
 WELDED = HERE.parents[1] / "models" / "welded_sheets.py"
 
 
@@ -117,28 +122,37 @@ def set_up(model: tc.Assembly | Path, solver: str) -> tuple[tc.Program, float]:
     return program, seconds
 
 
-def turn(program: tc.Program, realizations: int) -> tuple[float, float]:
-    """Return the time of a realization [us] of processor time, and the certified share."""
+def turn(program: tc.Program, realizations: int) -> tuple[float, Block]:
+    """Return the time of a realization [us] of processor time, and the realizations."""
     start = time.process_time()
     (block,) = tc.simulate_blocks(program, samples=realizations, seed=1, threads=1)
-    each = 1e6 * (time.process_time() - start) / realizations
-    return each, float((block.status == tc.Status.RESOLVED).mean())
+    return 1e6 * (time.process_time() - start) / realizations, block
 
 
-def cost(rows: Sequence[int], realizations: int) -> Table:
+def difference(block: Block, expected: Block) -> str:
+    """Return by how much measures [mm], and forces relative to the largest, differ from those of another solver."""
+    lengths = np.abs(block.measured - expected.measured).max()
+    forces = np.abs(block.load - expected.load).max() / np.abs(expected.load).max()
+    return f"{lengths:.0e}, {forces:.0e}"
+
+
+def cost(rows: Sequence[int], sheets: Sequence[int], realizations: int, folder: Path) -> Table:
     """Return the cost of a realization by model and solver: medians of turns, in which all of them alternate."""
     set_up(cover(rows[0]), SOLVERS[0])  # the mesh, and kernels that the first build compiles
-    models: dict[str, tc.Assembly | Path] = {f"cover, {count} points": cover(count) for count in rows}
-    cases = [(name, solver) for name, count in zip(models, rows, strict=True) for solver in SOLVERS if count <= LARGEST[solver]]
+    models: dict[str, tc.Assembly | Path] = {f"plate, {count} points": cover(count) for count in rows}
+    counts = dict(zip(models, rows, strict=True))
     models["welded sheets"] = WELDED
-    cases += [("welded sheets", solver) for solver in SOLVERS]
+    for count in sheets:
+        models[f"welded sheets, {count} rows"] = welded_sheets(count, folder)
+    cases = [(name, solver) for name in models for solver in SOLVERS if counts.get(name, 0) <= LARGEST[solver]]
     programs = {case: set_up(models[case[0]], case[1]) for case in cases}
     turns = [{case: turn(program, realizations) for case, (program, _) in programs.items()} for _ in range(TURNS)]
-    table: list[list[object]] = [["model", "solver", "set-up s", "us / realization", "certified"]]
+    table: list[list[object]] = [["model", "solver", "set-up s", "us / realization", "certified", "differs from graph by"]]
     for name, solver in cases:
-        times, certified = zip(*(of_turn[name, solver] for of_turn in turns), strict=True)
-        setup = f"{programs[name, solver][1]:.1f}"
-        table.append([name, solver, setup, f"{statistics.median(times):.0f}", f"{100 * certified[0]:.4g} %"])
+        times, blocks = zip(*(of_turn[name, solver] for of_turn in turns), strict=True)
+        setup, certified = f"{programs[name, solver][1]:.1f}", float((blocks[0].status == tc.Status.RESOLVED).mean())
+        differs = difference(blocks[0], turns[0][name, "graph"][1]) if solver != "graph" else ""
+        table.append([name, solver, setup, f"{statistics.median(times):.0f}", f"{100 * certified:.4g} %", differs])
     return table
 
 
@@ -147,10 +161,15 @@ def main() -> None:
     parser.add_argument("--realizations", type=int, default=1000)
     parser.add_argument("--rows", type=int, nargs="+", default=[38, 81, 153, 500])
     parser.add_argument("--to", type=Path, default=HERE, help="folder of the page")
+    parser.add_argument("--sheets", type=int, nargs="*", default=list(GRIDS), help="rows of the welded sheets")
+    parser.add_argument("--draws", type=int, default=20, help="draws that are compared with the whole mesh")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore", NominalWarning)
-    costs = cost(arguments.rows, arguments.realizations)  # first, in a process that has done nothing else
+    with tempfile.TemporaryDirectory() as folder:  # first, in a process that has done nothing else
+        costs = cost(arguments.rows, arguments.sheets, arguments.realizations, Path(folder))
     tables: dict[str, Table] = {"accuracy": accuracy(), "refusal": [["message"], [refusal()]], "cost": costs}
+    wholes = {"plate, 38 points": tc.build(cover(38)), "cover, 81 points": tc.build(bolted_cover(81))}
+    tables |= {"whole": whole_parts(wholes, arguments.draws), "set_up": set_up_cover(81)}
     write(__file__, tables, arguments.to)
 
 

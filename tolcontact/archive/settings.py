@@ -42,7 +42,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
     return {
         "solver": program.solver.name,
         "solver_options": json.dumps(program.solver.options),
-        "solver_second": ", ".join(program.solver.fallbacks),
+        "solver_second": ", ".join(program.solver.substitutes(elastic=program.bending is not None)),
         "solver_accuracy": ACCURACY,
         "resolution": method.resolution,
         "objective": method.objective,

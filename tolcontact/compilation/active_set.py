@@ -28,9 +28,9 @@ class ActiveSet(NamedTuple):
 
     @classmethod
     def of_answer(
-        cls, problem: Problem, answer: Mapping[str, np.ndarray], equalities: Int[Array, " k"], slacks: int, free: int
+        cls, problem: Problem, answer: Mapping[str, np.ndarray], equalities: Int[Array, " k"], slacks: int
     ) -> "ActiveSet":
-        """Return the active sets of a solver's answers; the rows `equalities` are equations, the last `free` slacks unbounded.
+        """Return the active sets of a solver's answers; the rows `equalities` are equations.
 
         problem     h (QP, n, n), g (QP, n), a (QP, row, n), lba (QP, row)
         answer      x (QP, n), lam_a (QP, row), lam_x (QP, n) of a solver; multipliers of active rows are negative
@@ -41,7 +41,6 @@ class ActiveSet(NamedTuple):
         active = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
         active[:, equalities] = True
         is_open = (-lam_x <= x)[:, x.shape[1] - slacks :]
-        is_open[:, slacks - free :] = True
         return cls(active, is_open)
 
     def answer(self, problem: Problem, order: Int[Array, " unknown"]) -> dict[str, np.ndarray]:

@@ -85,13 +85,6 @@ class ContactQP:
         return 0 if self.elastic is None else len(self.elastic.flexibility.rows)
 
     @property
-    def equalities(self) -> np.ndarray:
-        """The rows of the QP that are equations."""
-        rows = self.sparsity("a").size1()
-        holds = np.zeros(0, dtype=int) if self.flexibility is None else np.flatnonzero(self.flexibility.holds)
-        return np.concatenate([holds, np.arange(rows - self.equations, rows)])
-
-    @property
     def max_batch(self) -> int:
         """The number of realizations that are solved together."""
         entries = self.assemble.nnz_in() + self.assemble.nnz_out()

@@ -26,10 +26,11 @@ class ContactSolver:
     def __init__(self, qp: ContactQP, choice: SolverChoice) -> None:
         self._qp, self._choice = qp, choice
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
-        self._order = band_order(qp.sparsity("h"), qp.sparsity("a"), slacks=qp.slacks)
-        self._equalities = qp.equalities
         self._kernel = None if qp.elastic is None else SOLVERS["graph"].solver(qp)
-        self._max_dense = max(MAX_DENSE_ENTRIES // (sum(qp.sparsity("a").shape) + qp.slacks) ** 2, 1)
+        h, a = (qp.assemble.sparsity_out(name) for name in ("h", "a"))
+        self._order = band_order(h, a, slacks=qp.slacks) if qp.elastic is None else np.zeros(0, dtype=int)
+        self._equalities = np.arange(a.size1() - qp.equations, a.size1())
+        self._max_dense = max(MAX_DENSE_ENTRIES // (sum(a.shape) + qp.slacks) ** 2, 1)
         self._start_with(choice.solver(qp))
 
     def twin(self) -> "ContactSolver":
@@ -53,16 +54,15 @@ class ContactSolver:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
 
         Further inputs are `guess` (realization, row) and `guessed_slack` (realization, pair): probable reactions and slacks,
-        which a solver may start from. A further output is `second` (realization, 1): whether another solver had to answer.
+        which a solver may start from. A further output is `second` (realization, 1): whether another solver answered.
         Problems that this solver fails to solve are solved without curvature, since with it they may have no minimum: by this
         solver, and then by others. If all fail, `residual` is infinite, and other outputs may be NaN.
         """
         inputs = {name: flat(values) for name, values in arrays.items()}
         self._is_new = False
         answer = self._solved(self._solver, inputs)
-        answer["second"] = np.zeros_like(answer["residual"])
         self._retry(self._solver, answer, inputs, _is_lost(answer) & (inputs["newton"][:, 0] != 0), second=0.0)
-        for name in self._choice.fallbacks if self._kernel is None else ("graph", *self._choice.fallbacks):
+        for name in self._choice.substitutes(elastic=self._kernel is not None):
             lost = _is_lost(answer)
             if not lost.any():
                 break
@@ -83,7 +83,7 @@ class ContactSolver:
         if not rows.size:
             return
         retry = self._solved(solver, _of(inputs, rows) | {"newton": np.zeros((len(rows), 1))})
-        retry["second"] = np.full((len(rows), 1), second)
+        retry["second"] = np.maximum(retry["second"], second)
         better = retry["residual"][:, 0] < answer["residual"][rows, 0]
         _replace(answer, rows[better], _of(retry, better))
 
@@ -130,6 +130,7 @@ class ContactSolver:
         if self._kernel is not None:
             solution, failed = self._kernel(problem, inputs["guess"], slacks)
             outputs = self._finished(inputs | problem | solution)
+            outputs["second"][:] = 1
             return outputs, ~failed & ~(_is_rough(outputs) & ~(outputs["slack"] > ACCURACY).any(axis=1))
         active = np.zeros((len(slacks), self._qp.sparsity("a").size1()), dtype=np.bool_)
         active[:, : inputs["guess"].shape[1]] = inputs["guess"] > 0
@@ -137,7 +138,7 @@ class ContactSolver:
         outputs = {}
         predicted = np.zeros(len(slacks), dtype=np.bool_)
         for rows in self._parts(np.flatnonzero(inputs["guess"].any(axis=1))):
-            systems = self._dense_problem(problem, rows)
+            systems = self._dense_problem(_of(problem, rows))
             solution = ActiveSet(active[rows], slacks[rows] > 0).answer(systems, self._order)
             answer = self._finished(_of(inputs, rows) | _of(problem, rows) | solution)
             outputs = outputs or {name: np.empty((len(slacks), values.shape[1])) for name, values in answer.items()}
@@ -146,26 +147,26 @@ class ContactSolver:
         return outputs, predicted
 
     def _polished(self, inputs: Arrays, problem: Arrays, solution: Arrays, failed: Bool[Array, " realization"]) -> Arrays:
-        """Return the outputs for a solver's solutions; rough solutions are polished."""
+        """Return the outputs for a solver's solutions. Rough ones are polished, and all of elastic parts."""
         outputs = self._finished(inputs | problem | solution)
         outputs["residual"][failed] = np.inf
-        for rows in self._parts(np.flatnonzero(_is_rough(outputs) & np.isfinite(outputs["residual"][:, 0]))):
-            systems = self._dense_problem(problem, rows)
-            solutions, slacks = self._whole_solution(systems, _of(solution, rows)), self._qp.slacks
-            active = ActiveSet.of_answer(systems, solutions, self._equalities, slacks, self._qp.free_slacks)
-            answer = self._finished(_of(inputs, rows) | _of(problem, rows) | active.answer(systems, self._order))
+        if "opened" in solution:  # of the kernel itself
+            return outputs
+        is_rough = _is_rough(outputs) | (self._kernel is not None)
+        for rows in self._parts(np.flatnonzero(is_rough & np.isfinite(outputs["residual"][:, 0]))):
+            polished = self._polish(_of(problem, rows), _of(solution, rows))
+            answer = self._finished(_of(inputs, rows) | _of(problem, rows) | polished)
             better = answer["residual"][:, 0] < outputs["residual"][rows, 0]
             _replace(outputs, rows[better], _of(answer, better))
         return outputs
 
-    def _whole_solution(self, systems: dict[str, np.ndarray], solution: Arrays) -> Arrays:
-        """Return solutions with the slacks of elastic parts, which follow from the reactions."""
-        size = solution["x"].shape[1]
-        if size == systems["a"].shape[2]:
-            return solution
-        slacks = -np.einsum("kij,ki->kj", systems["a"][:, :, size:], solution["lam_a"])
-        x, lam_x = solution["x"], solution["lam_x"]
-        return solution | {"x": np.hstack([x, slacks]), "lam_x": np.hstack([lam_x, np.zeros_like(slacks)])}
+    def _polish(self, problem: Arrays, solution: Arrays) -> Arrays:
+        """Return the answers of the active sets of a solver's solutions; the kernel of elastic parts exchanges wrong rows."""
+        if self._kernel is not None:
+            pushes = -solution["lam_a"][:, : problem["length"].shape[1]]
+            return self._kernel(problem, pushes, np.zeros_like(pushes))[0]
+        systems = self._dense_problem(problem)
+        return ActiveSet.of_answer(systems, solution, self._equalities, self._qp.slacks).answer(systems, self._order)
 
     def _finished(self, arrays: Arrays) -> Arrays:
         """Return the outputs of `finish`; elastic parts bend by the reactions, and rows in conflict are `opened`."""
@@ -179,6 +180,7 @@ class ContactSolver:
             outputs["slack"] += np.maximum.reduceat(np.abs(arrays["opened"]), [span.start for span in self._qp.spans], axis=1)
         usable = np.isfinite(outputs["corrected"]).all(axis=1)
         residual = outputs["residual"]
+        outputs["second"] = np.zeros_like(residual)
         residual[~(usable & np.isfinite(residual[:, 0]))] = np.inf
         return outputs
 
@@ -186,9 +188,8 @@ class ContactSolver:
         """Return the rows in parts, so that the dense matrices of a part take little memory."""
         return np.split(rows, range(self._max_dense, len(rows), self._max_dense)) if rows.size else []
 
-    def _dense_problem(self, problem: Arrays, rows: np.ndarray) -> dict[str, np.ndarray]:
-        whole = self._qp.whole({name: problem[name][rows] for name in ("h", "g", "a", "lba", "length")})
-        return {name: self._dense(name, whole[name]) for name in ("h", "g", "a", "lba")}
+    def _dense_problem(self, problem: Arrays) -> dict[str, np.ndarray]:
+        return {name: self._dense(name, problem[name]) for name in ("h", "g", "a", "lba")}
 
     def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
         """Return all entries of an output of `assemble`: (realization, row, column), or (realization, row) of a vector."""

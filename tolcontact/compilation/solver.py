@@ -58,6 +58,10 @@ class SolverChoice(ABC):
     remembers: bool = False
     growth: int = 3
 
+    def substitutes(self, *, elastic: bool) -> tuple[str, ...]:
+        """Return the names of the solvers that answer in its place: of `elastic` parts, "graph" is the first."""
+        return self.fallbacks if not elastic or self.name == "graph" else ("graph", *self.fallbacks)
+
     @abstractmethod
     def is_usable(self) -> bool:
         """Return whether it is installed and solves a small problem correctly."""

@@ -1,6 +1,5 @@
 """A part as a free elastic body: nodes, and their displacements under forces. Lengths in mm, forces in N."""
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -13,6 +12,7 @@ from scipy import sparse
 
 from tolcontact import code_cache
 from tolcontact.arrays import Array, Float
+from tolcontact.code_cache import digest
 from tolcontact.errors import GeometryFault
 
 BLOCK_LOADS = 64  # solved at a time: the displacements of one block are in memory
@@ -105,12 +105,6 @@ def responses(
         code_cache.store(key, stored)
     values = np.frombuffer(stored).reshape(-1, count)
     return values[:count], values[count:].reshape(len(points), 3, count)
-
-
-def digest(*contents: np.ndarray | bytes) -> str:
-    """Return a digest of arrays and bytes."""
-    pieces = (content.tobytes() if isinstance(content, np.ndarray) else content for content in contents)
-    return hashlib.blake2b(b"".join(hashlib.blake2b(piece).digest() for piece in pieces), digest_size=16).hexdigest()
 
 
 @cache

@@ -7,7 +7,8 @@ from scipy import linalg, sparse
 from scipy.spatial import KDTree
 
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.elasticity.elastic_body import ElasticBody, digest, rigid_motions
+from tolcontact.code_cache import digest
+from tolcontact.elasticity.elastic_body import ElasticBody, rigid_motions
 from tolcontact.elasticity.node_table import node_table
 from tolcontact.elasticity.nodes_on_part import check_nodes
 from tolcontact.elasticity.stiffness_checks import free_stiffness

@@ -10,8 +10,9 @@ import numpy as np
 
 from tolcontact import code_cache
 from tolcontact.child import ChildDiedError, run_child
+from tolcontact.code_cache import digest
 from tolcontact.elasticity.cholesky import balanced_solver
-from tolcontact.elasticity.elastic_body import ElasticBody, digest, rigid_motions
+from tolcontact.elasticity.elastic_body import ElasticBody, rigid_motions
 from tolcontact.elasticity.pads import SurfacePads
 from tolcontact.elasticity.sources import MeshSource
 from tolcontact.elasticity.tetrahedra import Tetrahedra, node_volumes, stiffness_of, straightened

@@ -139,7 +139,7 @@ def _used_columns(program: Program) -> np.ndarray:
         used |= by_place[_dependence(program, "observe", "poses", output).any(axis=0)].any(axis=0)
     for pair in program.nominal.pairs:
         for columns in (pair.offsets.columns, *(face.columns for face in pair.deviating if face is not None)):
-            used[columns] = True
+            used[columns[columns < len(used)]] = True  # later inputs are gaps that welds keep
     return used
 
 

@@ -3,17 +3,19 @@
 import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import scipy
 from scipy.sparse.csgraph import connected_components
 
+from tolcontact import code_cache
 from tolcontact.declaration import GeometricTolerance
 from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
 from tolcontact.declaration.tolerance import SIDES
 from tolcontact.discretization import Nominal
 from tolcontact.errors import GeometryFault, ModelError, designation
-from tolcontact.features import FeatureOfSize, FormField, Freedom, Layer, NominalPattern
+from tolcontact.features import FeatureOfSize, FormField, Freedom, Layer, NominalPattern, minimum_zone, zone_kernel
 from tolcontact.features.freedoms import lot_score
 from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
 from tolcontact.features.tolerance_kinds import floats, includes_form
@@ -64,13 +66,22 @@ def _widths(field: FormField) -> np.ndarray:
 def _unit_widths(zone: tuple[tuple[bytes, bytes], ...], heights: bytes, modes: int) -> np.ndarray:
     """Return the widths (direction,) [mm] of minimum zones of a number of modes with heights (place, mode).
 
-    The zone is given by the indices and the rows of its members: equal faces have equal widths.
+    The zone is given by the indices and the rows of its members: equal faces have equal widths. They are kept in the cache
+    folder of the user.
     """
-    members = [
-        ZoneMember(indices, np.frombuffer(rows).reshape(len(indices), -1))
-        for indices, rows in ((np.frombuffer(indices, dtype=int), rows) for indices, rows in zone)
-    ]
-    return minimum_widths(members, directions(modes)[:DIRECTIONS] @ np.frombuffer(heights).reshape(-1, modes).T)
+    sources = (Path(str(module.__file__)).read_bytes() for module in (minimum_zone, zone_kernel, zones))
+    places = np.frombuffer(heights).reshape(-1, modes)
+    counts = np.array([DIRECTIONS, *places.shape, len(zone)])
+    key = "widths-" + code_cache.digest(*sources, counts, *(content for member in zone for content in member), heights)
+    stored = code_cache.load(key)
+    if stored is None:
+        members = [
+            ZoneMember(indices, np.frombuffer(rows).reshape(len(indices), -1))
+            for indices, rows in ((np.frombuffer(indices, dtype=int), rows) for indices, rows in zone)
+        ]
+        stored = minimum_widths(members, directions(modes)[:DIRECTIONS] @ places.T).tobytes()
+        code_cache.store(key, stored)
+    return np.frombuffer(stored)
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,7 +47,7 @@ def test_polishing_finds_the_solution_from_the_rows_that_carry():
     known = {"x": x, "lam_a": -lam, "lam_x": -bound}
     blurred = {name: values * (1 + 1e-5 * rng.normal(size=values.shape)) for name, values in known.items()}
     order = rng.permutation(size - slacks + rows)
-    active = ActiveSet.of_answer(problem, blurred, np.arange(rows - equal, rows), slacks, free=0)
+    active = ActiveSet.of_answer(problem, blurred, np.arange(rows - equal, rows), slacks)
     y, lam_a, lam_x = active.answer(problem, order).values()
     assert np.abs(y - x).max() < 1e-9
     assert np.abs(np.einsum("kij,kj->ki", H, y) + g + np.einsum("kij,ki->kj", A, lam_a) + lam_x).max() < 1e-10
