@@ -1,7 +1,7 @@
 """Checks of elastic parts under load, with figures: laws of linear elasticity, and what a finer mesh changes."""
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -180,40 +180,44 @@ def elastic_remarks(program: Program) -> Iterator[str]:
     deviations = np.concatenate([np.zeros_like(draws.deviations[:1]), draws.deviations[:DRAWS]])
     of_locators = deviations.copy()
     of_locators[:, len(program.nominal.locators) :] = 0  # deviating faces tilt normals
-    loaded = simulate_block(program, of_locators)
-    parts = [
-        LoadedPart(program, index, bodies[program.nominal.parts[index].part], bent, loaded)
-        for index, bent in program.bending.parts.items()
-    ]
-    for law in LAWS:
-        errors = [law.error(part) for part in parts]
-        worst = int(np.argmax(errors))
-        yield f"{law.name}: within {errors[worst]:.1e} of {law.unit}, {parts[worst].name}"
-        if not errors[worst] <= ACCURACY:
-            _doubt(f"{parts[worst].name}: {law.name} holds to {errors[worst]:.1e} of {law.unit} only; {law.remedy}")
-    yield from _rigid_limit(program, of_locators)
-    yield from _meshes(draws, bodies, deviations)
+    yield from law_remarks(loaded_parts(program, bodies, simulate_block(program, of_locators)))
+    if names := _overheld(program):
+        yield f"rigid limit: none, since {names} hold parts by more than six equations: rigid ones would not fit"
+    else:
+        yield limit_remark(*(simulate_block(stiffer(program, factor), of_locators) for factor in (STIFFER, STIFFER**2)))
+    yield from mesh_remarks(draws, bodies, deviations)
 
 
 def _doubt(sentence: str) -> None:
     warnings.warn(f"[bending] {sentence}", NominalWarning, stacklevel=4)
 
 
-def _rigid_limit(program: Program, deviations: np.ndarray) -> Iterator[str]:
-    """Yield how far parts of STIFFER times the stiffness are from rigid ones, if rigid parts fit their two-sided locators."""
-    assert program.bending is not None
-    if names := _overheld(program):
-        yield f"rigid limit: none, since {names} hold parts by more than six equations: rigid ones would not fit"
-        return
-    blocks = [simulate_block(stiffer(program, factor), deviations) for factor in (STIFFER, STIFFER**2)]
-    is_certified = np.all([np.isin(block.status, CERTIFIED) for block in blocks], axis=0)
-    distance = float(np.abs(blocks[0].poses - blocks[1].poses)[is_certified].max(initial=0))
-    yield f"rigid limit: poses differ by {distance:.1e} mm at {STIFFER:.0e} times the stiffness, and at {STIFFER**2:.0e} times"
+def loaded_parts(program: Program, bodies: Bodies, draws: Block) -> list[LoadedPart]:
+    """Return the elastic parts of a program, in each of their stations, under the loads of these draws."""
+    bent, parts = program.bending.parts if program.bending else {}, program.nominal.parts
+    return [LoadedPart(program, index, bodies[parts[index].part], flexibility, draws) for index, flexibility in bent.items()]
+
+
+def law_remarks(parts: Sequence[LoadedPart]) -> Iterator[str]:
+    """Yield how well the parts obey each of LAWS."""
+    for law in LAWS:
+        errors = [law.error(part) for part in parts]
+        worst = int(np.argmax(errors))
+        yield f"{law.name}: within {errors[worst]:.1e} of {law.unit}, {parts[worst].name}"
+        if not errors[worst] <= ACCURACY:
+            _doubt(f"{parts[worst].name}: {law.name} holds to {errors[worst]:.1e} of {law.unit} only; {law.remedy}")
+
+
+def limit_remark(stiff: Block, stiffest: Block) -> str:
+    """Return how far parts of STIFFER times the stiffness are from rigid ones, with its square."""
+    is_certified = np.isin(stiff.status, CERTIFIED) & np.isin(stiffest.status, CERTIFIED)
+    distance = float(np.abs(stiff.poses - stiffest.poses)[is_certified].max(initial=0))
     if not distance <= LIMIT_ACCURACY or not is_certified.all():
         _doubt(
             f"stiffer and stiffer parts are not placed as rigid ones: {distance:.1e} mm apart, "
-            f"{np.count_nonzero(~is_certified)} of {len(deviations)} draws not resolved; look at locators that hold the same"
+            f"{np.count_nonzero(~is_certified)} of {len(stiff)} draws not resolved; look at locators that hold the same"
         )
+    return f"rigid limit: poses differ by {distance:.1e} mm at {STIFFER:.0e} times the stiffness, and at {STIFFER**2:.0e} times"
 
 
 def stiffer(program: Program, factor: float) -> Program:
@@ -245,7 +249,7 @@ def _overheld(program: Program) -> str:
     return ""
 
 
-def _meshes(draws: TrialDraws, bodies: Bodies, deviations: Float[Array, "n contributor"]) -> Iterator[str]:
+def mesh_remarks(draws: TrialDraws, bodies: Bodies, deviations: Float[Array, "n contributor"]) -> Iterator[str]:
     """Yield how much a finer mesh of the parts changes the measurements, which is their uncertainty."""
     program, finer, largest_share = draws.program, dict(bodies), 0.0
     for part, body in bodies.items():
