@@ -10,7 +10,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import Program
-from tolcontact.compilation.other_flexibility import with_flexibility
+from tolcontact.compilation.other_flexibility import STIFFER, overheld, stiffer, with_flexibility
 from tolcontact.elasticity import ElasticBody
 from tolcontact.errors import GeometryFault, NominalWarning
 from tolcontact.mechanics.flexibility import Bodies, PartFlexibility, elastic_bodies, part_flexibilities
@@ -21,7 +21,7 @@ from tolcontact.vocabulary import CERTIFIED, CORRECTED
 DRAWS = 8  # under load, and the nominal assembly
 MAX_COLUMNS = 32  # unit loads of which reciprocity is tested
 ACCURACY = 1e-6  # relative, of the laws: rounding is far below, and matrices in single precision pass
-STIFFER, LIMIT_ACCURACY = 1e9, 1e-6  # [mm], of poses with so many times the stiffness, and with its square
+LIMIT_ACCURACY = 1e-6  # [mm], of poses with STIFFER times the stiffness, and with its square
 EDGE_SHARES, DIMENSIONS = (0.5, 0.7), 3  # edges of the finer mesh by those of the mesh
 MAX_NODES = 40_000  # of the finer mesh, so that a check takes a minute at most
 ORDER = 2  # of convergence: displacements of quadratic tetrahedra converge with order 2 to 4
@@ -181,7 +181,7 @@ def elastic_remarks(program: Program) -> Iterator[str]:
     of_locators = deviations.copy()
     of_locators[:, len(program.nominal.locators) :] = 0  # deviating faces tilt normals
     yield from law_remarks(loaded_parts(program, bodies, simulate_block(program, of_locators)))
-    if names := _overheld(program):
+    if names := overheld(program):
         yield f"rigid limit: none, since {names} hold parts by more than six equations: rigid ones would not fit"
     else:
         yield limit_remark(*(simulate_block(stiffer(program, factor), of_locators) for factor in (STIFFER, STIFFER**2)))
@@ -218,35 +218,6 @@ def limit_remark(stiff: Block, stiffest: Block) -> str:
             f"{np.count_nonzero(~is_certified)} of {len(stiff)} draws not resolved; look at locators that hold the same"
         )
     return f"rigid limit: poses differ by {distance:.1e} mm at {STIFFER:.0e} times the stiffness, and at {STIFFER**2:.0e} times"
-
-
-def stiffer(program: Program, factor: float) -> Program:
-    """Return the program with elastic parts of `factor` times the stiffness."""
-    parts = program.bending.parts.values() if program.bending else ()
-    scaled = ("C", "opening", "moved", "surface")
-    return with_flexibility(
-        program, [part._replace(**{name: getattr(part, name) / factor for name in scaled}) for part in parts]
-    )
-
-
-def _overheld(program: Program) -> str:
-    """Return the names of pairs that hold parts by more equations than these have freedoms; empty if none do."""
-    for group in program.groups:
-        rows, names = [], dict[str, None]()
-        for pair in (program.nominal.pairs[k] for k in group.group.pairs):
-            if not (pair.holds and pair.elastic):
-                continue
-            names[pair.name] = None
-            for P_m, n in zip(pair.P_m, pair.n_r, strict=True):
-                row = np.zeros((len(program.nominal.parts), 6))
-                row[pair.moving] = [*n, *np.cross(P_m, n) / group.group.length]
-                if pair.reference is not None:
-                    row[pair.reference] = -row[pair.moving]
-                rows.append(row.ravel())
-        if rows and np.linalg.matrix_rank(rows, tol=1e-9 * len(rows)) < len(rows):
-            first, *others = names
-            return f'"{first}"' + (f" and {len(others)} more" if others else "")
-    return ""
 
 
 def mesh_remarks(draws: TrialDraws, bodies: Bodies, deviations: Float[Array, "n contributor"]) -> Iterator[str]:

@@ -9,11 +9,11 @@ import pytest
 import tolcontact as tc
 from tests.helpers import call, compiled
 from tests.test_elastic_parts import supported_beam, tips
-from tolcontact.compilation.other_flexibility import with_flexibility
+from tolcontact.compilation.other_flexibility import stiffer, with_flexibility
 from tolcontact.errors import NominalWarning
 from tolcontact.mechanics.flexibility import elastic_bodies, part_flexibilities
 from tolcontact.plausibility import elastic_remarks
-from tolcontact.plausibility.elastic_checks import LAWS, law_remarks, limit_remark, loaded_parts, mesh_remarks, stiffer
+from tolcontact.plausibility.elastic_checks import LAWS, law_remarks, limit_remark, loaded_parts, mesh_remarks
 from tolcontact.plausibility.trial_draws import TrialDraws
 from tolcontact.simulation import simulate_block
 from tolcontact.vocabulary import CORRECTED
