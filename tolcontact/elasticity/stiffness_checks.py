@@ -82,8 +82,8 @@ def _check_diagonal(name: str, K: np.ndarray, freedoms: np.ndarray) -> None:
     is_empty = (diagonal == 0) & (np.isin(freedoms[:, 1], (1, 2, 3)) | (K != 0).any(axis=1))
     if is_empty.any():
         raise GeometryFault(
-            f"{name} has no stiffness at node {_listed(freedoms[is_empty, 0])}; leave nodes out that hang on nothing, or the file "
-            "is cut off"
+            f"{name} has no stiffness at node {_listed(freedoms[is_empty, 0])}; leave nodes out that hang on nothing, or "
+            "the file is cut off"
         )
 
 
