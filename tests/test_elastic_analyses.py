@@ -126,7 +126,7 @@ def test_rare_events_and_allocation_of_welded_sheets_follow_from_their_slopes(tm
     rare = tc.analyses.tails(welded(tmp_path, 3.5 * sigma), samples=30_000, solver="graph")["probability"]
     estimate, lower, upper = rare.sel(event="check 0 outside limits").values
     assert lower <= 2 * norm.sf(3.5) <= upper < 1.5 * estimate
-    found = tc.analyses.allocate(welded(tmp_path, 2 * sigma), "check 0: ppm 20000", samples=1024, solver="graph")
+    found = tc.analyses.allocate(welded(tmp_path, 2 * sigma), "check 0: ppm 20000", samples=512, solver="graph")
     spread = 0.05 / 6 * np.linalg.norm(slopes[1] * found.factor.sel(group=LABELS).values)
     assert found.met.values.all()
     assert 2 * norm.sf(2 * sigma / spread) <= 0.022
