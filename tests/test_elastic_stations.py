@@ -116,10 +116,11 @@ class WholeSheets:
         raise AssertionError("the points that touch are not found")
 
     def held(self, equations, targets):
-        """Displacements and multipliers of least energy that meet equations."""
+        """Displacements and multipliers of least energy that meet equations, for targets (equation,) or (equation, case)."""
         scale = abs(self.K).max()
         system = sp.bmat([[self.K / scale, sp.csc_matrix(equations).T], [sp.csc_matrix(equations), None]]).tocsc()
-        right, factors = np.concatenate([np.zeros(self.K.shape[0]), targets]), splu(system)
+        right = np.concatenate([np.zeros((self.K.shape[0], *targets.shape[1:])), targets])
+        factors = splu(system)
         x = factors.solve(right)
         x += factors.solve(right - system @ x)
         return x[: self.K.shape[0]], scale * x[self.K.shape[0] :]

@@ -58,3 +58,17 @@ def elastic_file(name: str, places: np.ndarray, stiffness: np.ndarray) -> Elasti
     path = Path(_FOLDER.name) / f"{name}.npz"
     np.savez(path, K=K.reshape(3 * len(places), -1), nodes=np.column_stack([places, np.zeros(len(places))]))
     return {"stiffness": path, "nodes": path}
+
+
+def saved_body(name: str, nodes: np.ndarray, deformations: np.ndarray, stiffness: np.ndarray) -> ElasticFiles:
+    """Return the keywords of `part.elastic` for a body with few `deformations` (deformation, 3 node) and their `stiffness`.
+
+    All others are 1e7 times as stiff as the stiffest of these. The file lives as long as the process.
+    """
+    arms = nodes - nodes.mean(axis=0)
+    motions = [*(np.tile(axis, len(nodes)) for axis in np.eye(3)), *(np.cross(axis, arms).ravel() for axis in np.eye(3))]
+    known = np.linalg.qr(np.column_stack([*motions, *deformations]))[0]
+    soft = deformations.T @ stiffness @ deformations
+    path = Path(_FOLDER.name) / f"{name}.npz"
+    np.savez(path, K=soft + IN_PLANE * np.abs(soft).max() * (np.eye(len(soft)) - known @ known.T), nodes=nodes)
+    return {"stiffness": path, "nodes": path}

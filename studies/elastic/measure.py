@@ -55,24 +55,37 @@ def bent(h: float, size: tuple[float, float, float] = (220.0, 20.0, 10.0)) -> fl
     return deflection / (length**3 / 48 / stiffness + length / 4 / (5 / 6 * E / 2 * width * height))
 
 
-def clamped(h: float, length: float, width: float = 20.0) -> float:
-    """Return the deflection of a sheet of 1 mm under its weight, all nodes of both ends held, by Timoshenko's."""
-    body = box((length, width, 1.0), 0.0, h)
-    nodes = body.nodes
-    ends = np.flatnonzero(np.abs(nodes[:, 0] - length / 2) > length / 2 - 1e-6)
+def sagged(body: elasticity.ElasticBody, ends: np.ndarray) -> np.ndarray:
+    """Return the displacements (node, 3) of a body under its weight, the nodes `ends` held."""
     held = (3 * ends[:, None] + np.arange(3)).ravel()
-    units = np.eye(nodes.size)[:, held]
+    units = np.zeros((body.nodes.size, len(held)))
+    units[held, np.arange(len(held))] = 1
     weight = body.weight(np.array([0, 0, -GRAVITY]))
     by_reactions, by_weight = body.response(units), body.response(weight[:, None])[:, 0]
     R, _ = body.rigid
     system = np.block([[by_reactions[held], R[held]], [R[held].T, np.zeros((6, 6))]])
     answer = np.linalg.solve(system, -np.concatenate([by_weight[held], R.T @ weight]))
-    u = by_weight + by_reactions @ answer[: len(held)] + R @ answer[len(held) :]
-    middle = np.abs(nodes[:, 0] - length / 2)
+    return np.asarray(by_weight + by_reactions @ answer[: len(held)] + R @ answer[len(held) :]).reshape(-1, 3)
+
+
+def clamped(h: float, length: float, width: float = 20.0) -> float:
+    """Return the deflection of a sheet of 1 mm under its weight, all nodes of both ends held, by Timoshenko's."""
+    body = box((length, width, 1.0), 0.0, h)
+    from_middle = np.abs(body.nodes[:, 0] - length / 2)
+    u = sagged(body, np.flatnonzero(from_middle > length / 2 - 1e-6))
     q = DENSITY * 1e-9 * GRAVITY * width
     expected = q * length**4 / 384 / (E * width / 12) + q * length**2 / 8 / (5 / 6 * E / 2 * width)
-    near = np.argsort(middle)[:1]
-    return float(-u[3 * near + 2].mean() / expected)
+    return float(-u[from_middle.argmin(), 2] / expected)
+
+
+def clamped_disc(h: float, radius: float = 15.0, nu: float = 0.3) -> float:
+    """Return the deflection of a round sheet of 1 mm under its weight, its rim held, by Mindlin's theory."""
+    mesh = trimesh.creation.cylinder(radius, 1.0, sections=96)
+    body = elasticity.elastic_body(elasticity.MeshSource(mesh.vertices, mesh.faces, E, nu, DENSITY, element_size=h))
+    from_centre = np.hypot(*body.nodes[:, :2].T)
+    u = sagged(body, np.flatnonzero(from_centre > np.cos(np.pi / 96) * radius - 1e-6))
+    q, rigidity, shear = DENSITY * 1e-9 * GRAVITY, E / 12 / (1 - nu**2), 5 / 6 * E / 2 / (1 + nu)
+    return float(-u[from_centre.argmin(), 2] / (q * radius**4 / 64 / rigidity + q * radius**2 / 4 / shear))
 
 
 def percent(ratio: float) -> str:
@@ -83,9 +96,10 @@ def percent(ratio: float) -> str:
 def accuracy() -> Table:
     """Return the errors of deflections by element size in thicknesses, and the message beyond the limit."""
     rows: list[list[object]] = [["element size / thickness", "beam on supports, 200 x 20 x 10"]]
-    rows[0] += [f"clamped sheet, {length:g} x 20 x 1" for length in LENGTHS]
+    rows[0] += [*(f"clamped sheet, {length:g} x 20 x 1" for length in LENGTHS), "clamped disc, diameter 30 x 1"]
     for k in SIZES:
-        rows.append([f"{k:g}", percent(bent(10 * k)), *(percent(clamped(k, length)) for length in LENGTHS)])
+        sheets = (percent(clamped(k, length)) for length in LENGTHS)
+        rows.append([f"{k:g}", percent(bent(10 * k)), *sheets, percent(clamped_disc(k))])
     return rows
 
 

@@ -3,7 +3,7 @@
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -62,6 +62,11 @@ def _first_order_variances(results: xr.DataTree) -> np.ndarray:
     return variances
 
 
+def _rigid_values(results: xr.DataTree) -> Any:
+    """Return values of a run with rigid parts in place of elastic ones."""
+    return import_module("tolcontact.analyses.rigid_parts").rigid_values(results)
+
+
 @app.command(epilog=examples("report run.nc", "report run.nc --out page.html", "report run.nc --xlsx tables.xlsx"))
 def report(
     archive: Archive,
@@ -85,7 +90,8 @@ def report(
     with waiting(f"writing the report of {archive}"), archives.open_archive(archive) as results:
         summary, titles = workflow.summarize(results), title_block_of(results.attrs).overridden(entries)
         if page is not None:
-            reports.write_page(results, summary, page, titles, partial(_first_order_variances, results))
+            variances, rigid = partial(_first_order_variances, results), partial(_rigid_values, results)
+            reports.write_page(results, summary, page, titles, variances, rigid)
         if xlsx is not None:
             reports.write_spreadsheet(results, summary, xlsx, titles)
     for kind, path in (("report", page), ("spreadsheet", xlsx)):

@@ -21,7 +21,7 @@ from tolcontact.declaration.values import key_faults
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.geometry import parts_from
-from tolcontact.plausibility import drawing_remarks
+from tolcontact.plausibility import drawing_remarks, elastic_remarks
 from tolcontact.pmi import read_pmi
 from tolcontact.pmi.declared import declared_file
 from tolcontact.report import nominal_and_faults, write_guide, write_page, write_view
@@ -83,6 +83,9 @@ def check(
                 return
             assembly = load_model(model)
             program = build(assembly, solver=solver, method=common.method_choices(resolution=resolution, objective=objective))
+        with waiting("solving elastic parts again, with finer meshes"), warnings.catch_warnings(record=True) as elastic_doubts:
+            elastic = list(elastic_remarks(program))
+            doubts += elastic_doubts
     except ModelError as error:
         common.show_warnings(doubts)
         if view and assembly is not None:
@@ -96,7 +99,7 @@ def check(
     for part in program.nominal.last_parts:
         size = " x ".join(f"{length:.4g}" for length in part.body.extents.round(9))
         common.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
-    for line in program.elastic_parts_in_words:
+    for line in (*program.elastic_parts_in_words, *(f"  {remark}" for remark in elastic)):
         common.echo(f"  {line}")
     for k, pair in enumerate(program.nominal.pairs):
         common.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")

@@ -12,6 +12,7 @@ _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([+-]\d+)|[eEdD](\d+))?
 def dmig_matrix(text: str, max_freedoms: int) -> tuple[np.ndarray, np.ndarray]:
     """Return freedoms (row, 2) and the stiffness matrix (row, row) of the only DMIG matrix whose name begins with K.
 
+    Names that begin with K4 are structural damping.
     Raises ValueError if there is none, or if it is complex, rectangular or damaged.
     """
     headers, columns = dict[str, list[str]](), list[list[str]]()
@@ -20,7 +21,7 @@ def dmig_matrix(text: str, max_freedoms: int) -> tuple[np.ndarray, np.ndarray]:
             headers[fields[0]] = fields
         else:
             columns.append(fields)
-    names = [name for name in headers if len(headers) == 1 or name.startswith("K")]
+    names = [name for name in headers if len(headers) == 1 or (name.startswith("K") and not name.startswith("K4"))]
     if len(names) != 1:
         raise ValueError(f"it has the DMIG matrices {', '.join(headers) or 'none'}; expected one whose name begins with K")
     form, kind = headers[names[0]][2:4]

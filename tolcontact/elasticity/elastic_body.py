@@ -36,7 +36,9 @@ class ElasticBody:
     mass       [kg]; NaN if it is unknown
     pads       spreads unit forces
     balanced   returns displacements (3 node, load) [mm], up to rigid motions, under balanced forces (3 node, load) [N]
+    restoring  returns the nodal forces K u (3 node, load) [N] of displacements u (3 node, load) [mm]
     key        a digest of nodes and stiffness: equal bodies have equal keys
+    finer      returns the same part from a mesh whose edges are this share of its own; None for an imported matrix
     """
 
     nodes: Float[Array, "node 3"]
@@ -44,7 +46,9 @@ class ElasticBody:
     mass: float
     pads: Pads
     balanced: Callable[[np.ndarray], np.ndarray]
+    restoring: Callable[[np.ndarray], np.ndarray]
     key: str
+    finer: "Callable[[float], ElasticBody] | None" = None
 
     def spread(
         self, points: Float[Array, "load 3"], directions: Float[Array, "load 3"], radius: float | None

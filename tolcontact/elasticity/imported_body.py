@@ -50,4 +50,12 @@ def imported_body(
         columns = np.broadcast_to(np.arange(len(points))[:, None], rows.shape)
         return sparse.csc_array((directions.ravel(), (rows.ravel(), columns.ravel())), shape=(len(K), len(points)))
 
-    return ElasticBody(positions, shares, np.nan, pads, lambda forces: linalg.cho_solve(factor, forces), digest(positions, K))
+    return ElasticBody(
+        nodes=positions,
+        shares=shares,
+        mass=np.nan,
+        pads=pads,
+        balanced=lambda forces: linalg.cho_solve(factor, forces),
+        restoring=lambda displacements: np.asarray(K @ displacements),
+        key=digest(positions, K),
+    )

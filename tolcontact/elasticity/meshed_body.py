@@ -2,11 +2,13 @@
 
 import io
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+from scipy import sparse
 
 from tolcontact import code_cache
 from tolcontact.child import ChildDiedError, run_child
@@ -32,8 +34,10 @@ def meshed_body(source: MeshSource) -> ElasticBody:
     _check(source)
     vertices, faces = np.ascontiguousarray(source.vertices, dtype=float), np.ascontiguousarray(source.faces, dtype=np.int64)
     area = float(np.linalg.norm(_normals(vertices, faces), axis=1).sum() / 2)
-    mesh = _mesh(vertices, faces, source.step, element_size(vertices, faces, area, source.element_size))
-    return body_of(mesh, source.young, source.poisson, source.density)
+    size = element_size(vertices, faces, area, source.element_size)
+    mesh = _mesh(vertices, faces, source.step, size)
+    body = body_of(mesh, source.young, source.poisson, source.density)
+    return replace(body, finer=lambda share: meshed_body(replace(source, element_size=share * size)))
 
 
 def body_of(mesh: Tetrahedra, young: float, poisson: float, density: float | None = None) -> ElasticBody:
@@ -47,11 +51,15 @@ def body_of(mesh: Tetrahedra, young: float, poisson: float, density: float | Non
     mass = np.nan if density is None else CUBIC_METRES * density * volume
 
     @cache
-    def solver() -> Callable[[np.ndarray], np.ndarray]:
-        return balanced_solver(stiffness_of(mesh, young, poisson), rigid_motions(mesh.nodes, shares), mesh.nodes)
+    def stiffness() -> sparse.csr_array:
+        return stiffness_of(mesh, young, poisson)
 
-    key = digest(mesh.nodes, mesh.elements, np.array([young, poisson]))
-    return ElasticBody(mesh.nodes, shares, mass, SurfacePads(mesh, volume), lambda forces: solver()(forces), key)
+    @cache
+    def solver() -> Callable[[np.ndarray], np.ndarray]:
+        return balanced_solver(stiffness(), rigid_motions(mesh.nodes, shares), mesh.nodes)
+
+    key, pads = digest(mesh.nodes, mesh.elements, np.array([young, poisson])), SurfacePads(mesh, volume)
+    return ElasticBody(mesh.nodes, shares, mass, pads, lambda f: solver()(f), lambda u: np.asarray(stiffness() @ u), key)
 
 
 def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -23,7 +24,7 @@ def node_table(path: Path) -> NodeTable:
     """Return the nodes of a file. Raises GeometryFault if it cannot be read, or repeats a number."""
     try:
         numbers, positions = (_npz if path.suffix.lower() == ".npz" else _csv)(path)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, BadZipFile) as error:
         raise GeometryFault(
             f'node file "{path}" cannot be read: {error}; expected .csv with columns x, y, z [mm], or number, x, y, z, below a '
             "heading, or .npz with the arrays nodes (node, 3) and, for DMIG and Abaqus, numbers (node,)"

@@ -69,7 +69,7 @@ def _freedoms(file: StiffnessFile, table: NodeTable) -> tuple[Int[Array, "row 2"
     if len(held):
         raise GeometryFault(
             f'stiffness file "{file.path}" lacks displacements of node {_listed(held)}; expected x, y and z of '
-            "each: retain all three, and leave supports out"
+            "each: retain all three, and leave supports out; or the file is cut off"
         )
     return freedoms, dict(zip(map(int, numbers), table.positions, strict=True))
 
@@ -82,7 +82,8 @@ def _check_diagonal(name: str, K: np.ndarray, freedoms: np.ndarray) -> None:
     is_empty = (diagonal == 0) & (np.isin(freedoms[:, 1], (1, 2, 3)) | (K != 0).any(axis=1))
     if is_empty.any():
         raise GeometryFault(
-            f"{name} has no stiffness at node {_listed(freedoms[is_empty, 0])}; leave nodes out that hang on nothing"
+            f"{name} has no stiffness at node {_listed(freedoms[is_empty, 0])}; leave nodes out that hang on nothing, or "
+            "the file is cut off"
         )
 
 
@@ -116,9 +117,14 @@ def _check_rigid_motions(name: str, K: np.ndarray, freedoms: np.ndarray, where: 
     worst = freedoms[int(np.argmax(forces.max(axis=1))), 0]
     resisted = ", ".join(f"{motion} ({error:.0e})" for motion, error in zip(MOTIONS, errors, strict=True) if error > SINGLE)
     if errors[:3].max() > SINGLE:
-        cause = f"a support or a spring to ground was left in, most of all at node {worst}; leave it out"
+        cause = (
+            f"a support or a spring to ground was left in, most of all at node {worst}; leave it out, or the file is cut off"
+        )
     else:
-        cause = f'positions in "{table}" do not belong to the matrix, most of all at node {worst}; check order, numbers, units'
+        cause = (
+            f'positions in "{table}" do not belong to the matrix, most of all at node {worst}; check order, numbers, units, '
+            "coordinate systems, and springs between nodes that are apart"
+        )
     raise GeometryFault(f"{name} resists rigid motions, relative to its entries: {resisted}: {cause}")
 
 

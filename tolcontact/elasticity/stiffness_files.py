@@ -8,19 +8,22 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from scipy import io, sparse
 
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.elasticity.abaqus_matrix import abaqus_matrix
+from tolcontact.elasticity.abaqus_matrix import abaqus_matrix, listed_matrix, lists_entries
 from tolcontact.elasticity.dmig import dmig_matrix
 from tolcontact.errors import GeometryFault
 from tolcontact.input_files import fault_of
 from tolcontact.tables import text_of
 
 MAX_BYTES, MAX_FREEDOMS = 1 << 30, 6000  # dense: 288 MB
-_KINDS = "an .npz file with K, Matrix Market, Nastran DMIG, or a substructure of Abaqus or CalculiX"
+START_BYTES = 1 << 24  # nodes and coordinate systems may stand before a matrix
+_KINDS = "an .npz file with K, Matrix Market, Nastran DMIG, or a substructure or matrix output of Abaqus or CalculiX"
+_BULK_DATA = rb"^(BEGIN (SUPER|BULK)|(GRID|SPOINT|CORD2R|EXTRN|DTI)\b)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +44,7 @@ def read_stiffness(path: Path) -> StiffnessFile:
         raise GeometryFault(f'stiffness file "{path}" {fault}; expected {_KINDS}')
     try:
         freedoms, matrix = _reader(path)(path)
-    except (OSError, ValueError, IndexError) as error:
+    except (OSError, ValueError, IndexError, BadZipFile) as error:
         raise GeometryFault(f'stiffness file "{path}" cannot be read: {error}; expected {_KINDS}') from error
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not len(matrix):
         raise GeometryFault(f'stiffness file "{path}" holds a matrix {matrix.shape}; expected a square one')
@@ -55,7 +58,7 @@ Content = tuple["np.ndarray | None", np.ndarray]
 
 def _reader(path: Path) -> Callable[[Path], Content]:
     with path.open("rb") as file:
-        start = file.read(1 << 16)
+        start = file.read(START_BYTES)
     if start[:2] == b"PK":
         return _npz
     if start[:14].lower() == b"%%matrixmarket":
@@ -64,6 +67,12 @@ def _reader(path: Path) -> Callable[[Path], Content]:
         return lambda path: dmig_matrix(text_of(path, MAX_BYTES), MAX_FREEDOMS)
     if re.search(rb"^\*USER ELEMENT", start, re.MULTILINE | re.IGNORECASE):
         return lambda path: abaqus_matrix(text_of(path, MAX_BYTES), MAX_FREEDOMS)
+    if lists_entries(start):
+        return lambda path: listed_matrix(text_of(path, MAX_BYTES), MAX_FREEDOMS)
+    if re.search(_BULK_DATA, start, re.MULTILINE | re.IGNORECASE):
+        raise ValueError(
+            "it is bulk data of Nastran without a matrix; punch it with EXTSEOUT(STIFFNESS,DMIGPCH) or PARAM,EXTOUT,DMIGPCH"
+        )
     raise ValueError("its kind is not recognized")
 
 

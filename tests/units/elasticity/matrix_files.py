@@ -31,6 +31,15 @@ def dmig(path, freedoms, matrix, digits=9, name="KAAX"):
     path.write_text("\n".join([*lines, ""]))
 
 
+def superelement(path, freedoms, matrix):
+    """A punch file of an external superelement: grids before the matrices, and structural damping before the stiffness."""
+    dmig(path, freedoms, matrix)
+    grids = [f"GRID*   {node:16d}{0:16d}{0.0:16.9E}{0.0:16.9E}\n*       {0.0:16.9E}{0:16d}" for node in range(1, 800)]
+    damping = ["DMIG    K4AAX          0       6       2       0                      99"]
+    damping += ["DMIG*   K4AAX                          1               1", f"*       {1:16d}{1:16d}{0.5:16.9E}"]
+    path.write_text("\n".join(["BEGIN SUPER      102", *grids, *damping, path.read_text()]))
+
+
 def free_dmig(path, freedoms, matrix):
     """Free fields, a square matrix: one or two entries in a line, the second one continued."""
     lines = ["DMIG,KF,0,1,2,0,,,99"]
@@ -53,6 +62,36 @@ def abaqus(path, freedoms, matrix):
     lines += [", ".join(map(str, (k + 1, *directions[k]))) for k in changes]
     lines += ["*MATRIX,TYPE=STIFFNESS", *_triangle(matrix), "*MATRIX,TYPE=MASS", *_triangle(np.eye(len(matrix)))]
     path.write_text("\n".join([*lines, ""]))
+
+
+def abaqus_with_modes(path, freedoms, matrix):
+    """Internal nodes for the amplitudes of two modes, commas and spaces at the ends of lines, CRLF."""
+    nodes = list(dict.fromkeys(node for node, _ in freedoms))
+    whole = np.zeros((len(matrix) + 2,) * 2)
+    whole[:-2, :-2], whole[-2:, -2:] = matrix, np.diag([3e7, 4e8])
+    lines = [
+        "**",
+        "** GENERATION OF SUBSTRUCTURE Z1      ",
+        f"*USER ELEMENT, NODES={len(nodes) + 2:10d}, LINEAR",
+        "** ELEMENT NODES",
+    ]
+    lines += ["** " + "".join(f"{node:10d}, " for node in chunk) for chunk in _chunks([*nodes, -1, -2], 10)]
+    lines += ["** NODE NUMBERS WHICH ARE NOT POSITIVE INDICATE Abaqus INTERNAL NODES.", "         1,         2,         3"]
+    lines += [f"{len(nodes) + 1:10d},         1", "*MATRIX,TYPE=STIFFNESS", *_triangle(whole)]
+    path.write_bytes("\r\n".join([*lines, ""]).encode())
+
+
+def labels(path, freedoms, matrix):
+    """*MATRIX OUTPUT, FORMAT=MATRIX INPUT: node and direction of row and column, the lower triangle."""
+    entries = np.argwhere(np.tril(matrix))
+    rows = ["{},{}, {},{}, {: .15e}".format(*freedoms[i], *freedoms[j], matrix[i, j]) for i, j in entries]
+    path.write_text("\n".join([*rows, ""]))
+
+
+def coordinate(path, freedoms, matrix):
+    """*MATRIX OUTPUT, FORMAT=COORDINATE: numbers of row and column from 1, the whole matrix."""
+    rows = [f"{i + 1}  {j + 1} {matrix[i, j]: .15e}" for i, j in np.argwhere(matrix)]
+    path.write_text("\n".join([*rows, ""]))
 
 
 def calculix(path, freedoms, matrix):

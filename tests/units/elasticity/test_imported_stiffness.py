@@ -19,6 +19,10 @@ WRITERS = {
     "free DMIG": (matrix_files.free_dmig, 1e-12),
     "Abaqus": (matrix_files.abaqus, 1e-9),
     "CalculiX": (matrix_files.calculix, 1e-9),
+    "superelement": (matrix_files.superelement, 1e-6),
+    "Abaqus with modes": (matrix_files.abaqus_with_modes, 1e-9),
+    "labels": (matrix_files.labels, 1e-12),
+    "coordinate": (matrix_files.coordinate, 1e-12),
 }
 
 
@@ -140,7 +144,7 @@ FAULTS = {
 
 
 WHOLE = [matrix_files.free_dmig, matrix_files.npz]  # Abaqus and CalculiX write one triangle
-NUMBERED = [matrix_files.free_dmig, matrix_files.abaqus, matrix_files.calculix]
+NUMBERED = [matrix_files.free_dmig, matrix_files.abaqus, matrix_files.calculix, matrix_files.labels]
 
 
 @pytest.mark.parametrize(
@@ -152,6 +156,28 @@ def test_a_planted_fault_has_one_message(tmp_path, fault, writer):
     with pytest.raises(GeometryFault, match=message) as caught:
         elastic_body(source(tmp_path, writer, **arguments))
     assert "part." in str(caught.value) or "nodes.csv" in str(caught.value)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9])
+@pytest.mark.parametrize(
+    "kind", [kind for kind in WRITERS if kind not in ("Abaqus", "superelement")]
+)  # no other matrix at the end
+def test_a_truncated_file_has_one_message(tmp_path, kind, share):
+    arguments = source(tmp_path, WRITERS[kind][0])
+    content = arguments.stiffness.read_bytes()
+    arguments.stiffness.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(GeometryFault) as caught:
+        elastic_body(arguments)
+    assert len(str(caught.value).splitlines()) == 1
+    assert "cannot be read" in str(caught.value) or "cut off" in str(caught.value), str(caught.value)
+
+
+def test_a_truncated_table_of_nodes_is_named(tmp_path):
+    np.savez(tmp_path / "k.npz", K=STIFFNESS)
+    np.savez(tmp_path / "n.npz", nodes=NODES)
+    (tmp_path / "n.npz").write_bytes((tmp_path / "n.npz").read_bytes()[:500])
+    with pytest.raises(GeometryFault, match=r'node file ".*n.npz" cannot be read'):
+        elastic_body(MatrixSource(tmp_path / "k.npz", tmp_path / "n.npz"))
 
 
 def test_rows_without_numbers_are_as_many_as_the_table_has(tmp_path):
@@ -215,6 +241,14 @@ def test_a_force_between_nodes_is_refused_with_the_distance(tmp_path):
     ("text", "message"),
     [
         ("hello", "kind is not recognized; expected an .npz file"),
+        ("BEGIN SUPER 102\nGRID,1,,0.,0.,0.\n", "bulk data of Nastran without a matrix; punch it with EXTSEOUT"),
+        (
+            "1,1, 1,1, 1.0e+36\n2,1, 1,1, -3.0e+02\n2,1, 2,1, 3.0e2\n",
+            "a boundary condition holds node 1 and others, 1 freedoms",
+        ),
+        ("-1,1, -1,1, 3.3e+01\n1,1, -1,1, 2.5e+01\n", "internal node -1 of Abaqus, .*export a substructure"),
+        ("1,1, 1,1, 1.0e+3\n2,1, 1,1\n", 'its entry "2,1, 1,1" has 4 numbers, and the first one 5'),
+        ("1 1 1.0\n9000 9000 1.0\n", "it has 9000 freedoms, at most 6000"),
         ("*USER ELEMENT, NODES=2, LINEAR\n** ELEMENT NODES\n** 1,2\n1,2,3\n", r"0 \*MATRIX, TYPE=STIFFNESS"),
         (
             "*USER ELEMENT, NODES=2\n** 1,2\n1,2,3\n*MATRIX,TYPE=STIFFNESS\n1.,2.\n",

@@ -24,6 +24,7 @@ from tolcontact.report.archived_analysis import archived_analysis
 from tolcontact.report.comparison_text import change_table, contributor_table, runs_lines, value_table
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares, shares_or_first_order
 from tolcontact.report.convention_text import offset_table
+from tolcontact.report.elastic_tables import RigidMeasured, elastic_tables
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
 from tolcontact.report.html.loop import loops_of
@@ -43,6 +44,7 @@ SCRIPTS = {
         "data.js",
         "labels.js",
         "viewer.js",
+        "reactions.js",
         "stations.js",
         "charts.js",
         "report.js",
@@ -63,10 +65,10 @@ CASES_NOTE = "Those with contact are the first of the single realizations above.
 
 def write_page(
     results: xr.DataTree, summary: xr.Dataset, path: Path, title_block: TitleBlock | None = None,
-    variances: Callable[[], np.ndarray] | None = None,
+    variances: Callable[[], np.ndarray] | None = None, rigid: Callable[[], RigidMeasured | None] | None = None,
 ) -> None:  # fmt: skip
     """Write the report of a run (see page_of). Raises ArchiveError if the file cannot be written."""
-    _write(page_of(results, summary, title_block, variances), path)
+    _write(page_of(results, summary, title_block, variances, rigid), path)
 
 
 def write_view(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
@@ -89,11 +91,12 @@ def is_page(path: Path) -> bool:
 
 def page_of(
     results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock | None = None,
-    variances: Callable[[], np.ndarray] | None = None,
+    variances: Callable[[], np.ndarray] | None = None, rigid: Callable[[], RigidMeasured | None] | None = None,
 ) -> str:  # fmt: skip
     """Return the report of a run with this summary; the default `title_block` comes from the archive.
 
     Where shares of contributors cannot be estimated, `variances` is called for first-order ones (see shares_or_first_order).
+    With elastic parts, `rigid` is called for values with rigid ones (see variance_table).
     """
     scene, titles = scene_of(results, summary), title_block or title_block_of(results.attrs)
     shares, document = shares_or_first_order(results, summary.attrs["realizations"], variances), declaration_of(results)
@@ -111,6 +114,7 @@ def page_of(
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
         "pairs": pair_table(summary) if summary.sizes["pair"] else None,
         "offsets": offset_table(summary),
+        "elastic": list(elastic_tables(results, rigid)),
         "reactions": terms.reaction_words(summary["reaction"].attrs["units"]).explanation,
         "tables": list(tables_of(results)),
         "contributions": (indices := contributions_of(results)),

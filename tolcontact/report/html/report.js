@@ -206,6 +206,7 @@ function relations() {
 // Pictures come first: charts use the remaining room.
 if (byId("scene")) try {
   window.viewer = new Viewer(data.scene);
+  if (data.scene.reactions.length) window.viewer.marks.reactions = reactionArrows(window.viewer, data.scene.reactions);
   data.charts.slice(0, MOST_PORTRAITS).forEach((measure, number) => portrait(window.viewer, measure, placeOf(number, "portrait")));
   control(window.viewer);
   drive(window.viewer);

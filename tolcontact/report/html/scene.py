@@ -23,6 +23,7 @@ from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.realizations import finished
 from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
 from tolcontact.report.archived_analysis import archived_analysis
+from tolcontact.report.elastic_tables import reactions_of
 from tolcontact.report.html.form_scene import MAX_GAPS, SingleStates
 from tolcontact.report.html.station_scenes import station_poses, stations_of, stations_of_nominal, worst_poses
 from tolcontact.statistics import touching
@@ -78,10 +79,24 @@ def scene_of(results: xr.DataTree, summary: xr.Dataset) -> Scene:
         **packed_marks(marks_of(results)),
         "realizations": _realizations(results, singles, states),
         "stations": _stations(results, states),
+        "reactions": _reactions(results),
     }
     _add_contact(scene["contacts"], results, summary)
     _add_gaps(scene["contacts"], states, len(singles))
     return {**scene, "reactionUnits": summary["reaction"].attrs["units"]}
+
+
+def _reactions(results: xr.DataTree) -> list[Scene]:
+    """Return the arrows of reactions of elastic parts: place, direction, mean, and 2.5th and 97.5th percentiles [N]."""
+    arrows = []
+    for reaction in reactions_of(results):
+        if len(reaction.values):
+            low, high = np.percentile(reaction.values, (2.5, 97.5)).tolist()
+            arrows.append(
+                {"pair": reaction.pair, "at": reaction.at.tolist(), "along": reaction.along.tolist(),
+                 "mean": float(reaction.values.mean()), "low": low, "high": high}
+            )  # fmt: skip
+    return arrows
 
 
 def _add_contact(pairs: list[Scene], results: xr.DataTree, summary: xr.Dataset) -> None:

@@ -31,6 +31,7 @@ class Stations {
     viewer.parts.forEach((part, k) => { part.group.visible = parts.includes(k); });
     viewer.marks.locators.children.forEach((cone) => { cone.visible = locators.includes(cone.name); });
     viewer.pairs.forEach((pair) => { pair.points.visible = contacts.includes(pair.name); });
+    viewer.marks.reactions?.children.forEach((arrow) => { arrow.visible = contacts.includes(arrow.name); });
     viewer.marks.points.children.forEach((mark) => { mark.visible = measures.includes(mark.name); });
     document.querySelectorAll("#parts input").forEach((box, k) => { box.checked = parts.includes(k); });
     viewer.draw();

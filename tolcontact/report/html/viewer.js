@@ -360,7 +360,7 @@ class Viewer {
 
 /** What is shown, and cut: the same controls on every page. */
 function control(viewer) {
-  ["locators", "contacts", "points", "features", "forces"].forEach((id) =>
+  Object.keys(viewer.marks).forEach((id) =>
     byId(id).addEventListener("change", () => { viewer.marks[id].visible = byId(id).checked; viewer.draw(); }));
   const cut = () => viewer.cut(byId("across").value, Number(byId("cut").value) / 1000);
   byId("across").addEventListener("change", cut);

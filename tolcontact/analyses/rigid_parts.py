@@ -1,0 +1,43 @@
+"""The same realizations with rigid parts in place of elastic ones: what elasticity adds to the variance of a run."""
+
+from typing import NamedTuple
+
+import xarray as xr
+
+from tolcontact.archive import method_of_run, model_of
+from tolcontact.arrays import Array, Float
+from tolcontact.compilation import compile_program
+from tolcontact.compilation.other_flexibility import STIFFER, overheld, stiffer
+from tolcontact.discretization import discretize
+from tolcontact.realizations import finished
+from tolcontact.simulation import simulate_block
+from tolcontact.vocabulary import CORRECTED, DEVIATION, MEASURED, RAW
+
+MAX_ROWS = 1000
+SOLVER = "graph"
+
+
+class RigidValues(NamedTuple):
+    """Values of the first realizations of a run with rigid parts, and a sentence that says how these are placed."""
+
+    measured: Float[Array, "realization measure"]
+    words: str
+
+
+def rigid_values(results: xr.DataTree) -> RigidValues | None:
+    """Return the values of the first MAX_ROWS realizations with rigid parts; None if the run did not keep its deviations.
+
+    Elastic parts are STIFFER times as stiff. Rigid parts do not fit more equations than they have freedoms, so where locators
+    or welds hold more, values are those without contact: rigid parts fit their locators best.
+    Raises ModelError or ArchiveError if the model cannot be rebuilt.
+    """
+    rows, sample = slice(0, min(finished(results), MAX_ROWS)), results["sample"].to_dataset()
+    if DEVIATION.name not in sample:
+        return None
+    assembly, method = model_of(results), method_of_run(results)
+    program = compile_program(discretize(assembly, presses=method.minimizes.presses), SOLVER, method)
+    if names := overheld(program):
+        words = f"rigid parts without contact, which fit their locators best, since no rigid part fits what {names} hold"
+        return RigidValues(results.to_dataset()[MEASURED.name].values[rows, RAW], words)
+    block = simulate_block(stiffer(program, STIFFER), sample[DEVIATION.name].values[rows])
+    return RigidValues(block.measured[:, CORRECTED], "the same realizations with rigid parts and contact")
