@@ -79,7 +79,7 @@ def test_the_settings_of_a_run_are_its_attributes(archive):
 @pytest.mark.slow
 def test_the_weighting_is_that_of_points_where_points_count():
     for objective, weighting, units in (
-        ("all points", "all points, by area and its moments", "mm"),
+        ("all points", "all points, as opposite faces by their moments", "mm"),
         ("locator stiffness", "none", "N"),
     ):
         found = tc.run(cases.stack(), samples=5, solver="daqp", method={"objective": objective})

@@ -14,7 +14,7 @@ from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.measured_geometry import NominalMeasurement
 from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
-from tolcontact.discretization.point_weights import point_weights
+from tolcontact.discretization.point_weights import CountedRegion, counted_region, point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.weld import ElasticInputs, Weld
 from tolcontact.features import Expansion, FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
@@ -39,6 +39,7 @@ class ContactPoints:
     is the part that they are on, or None for the ground. They have no faces; their offsets are the deviations.
 
     moving_face, reference_face   in their nominal poses
+    within      [mm] how far from each other opposite faces count in an objective
     coordinate_error   [mm] of both bodies, as their files store them: P_r lie below the reference face by it
     facets      [mm] largest distance between their triangles and the round faces that these approximate
     sampling_error   [mm] that bodies may penetrate undetected between points of curved faces; None for other points
@@ -60,6 +61,7 @@ class ContactPoints:
     offsets: Offsets
     reference_face: Surface | None = None
     moving_face: Surface | None = None
+    within: float = np.inf
     coordinate_error: float = 0.0
     facets: float = 0.0
     sampling_error: float | None = None
@@ -171,8 +173,20 @@ class ContactPoints:
         """The weights of the points (point,), by the areas that they represent; equal ones without sampled faces."""
         if self.moving_face is None or self.reference_face is None or self.round is not None:
             return np.ones(len(self.P_m))
-        distance = float(np.linalg.norm(self.P_m - self.P_r, axis=1).max())
-        return point_weights(self.P_m, distance, self.moving_face, self.reference_face)
+        return point_weights(self.P_m, self.within, self.moving_face, self.reference_face)
+
+    @cached_property
+    def regions(self) -> tuple[CountedRegion | None, CountedRegion | None]:
+        """The parts of the moving and of the reference face that an objective counts; None without faces or such a part."""
+        moving, reference = self.moving_face, self.reference_face
+        if moving is None or reference is None:
+            return None, None
+        return counted_region(moving, reference, self.within), counted_region(reference, moving, self.within)
+
+    @property
+    def area(self) -> float:
+        """The area [mm^2] of the moving face that an objective counts; 0 without faces, or if no part is opposite to the other."""
+        return 0.0 if self.regions[0] is None else self.regions[0].area
 
     @cached_property
     def bulge(self) -> float:
