@@ -13,6 +13,7 @@ MAX_COMPARED = 4_000_000  # pairs that may be nearer than a pair of the same tri
 BLOCK_TRIANGLES = 64
 TIE = 1e-10  # of the face's size: distances that count as 0
 MIN_AREA = 1e-14  # of the face's area: smaller triangles are rounding
+BEHIND = 0.1  # of the distance in front of a face: how far behind it opposite faces count
 FACING = 1e-9  # smallest cosine of the angle between normals of triangles that face each other
 
 
@@ -24,9 +25,9 @@ class Opposite(NamedTuple):
 
 
 def opposite(face: Surface, target: Surface, within: float) -> Opposite | None:
-    """Return the part of a face that is over the target, along its normals, within a distance [mm] in front of it or behind.
+    """Return the part of a face that is over the target, along its normals, within a distance [mm] in front of it.
 
-    The target must face it there. Over several triangles of the target, the nearest one counts. The result is exact for
+    A tenth of this distance behind it counts, too, since bodies may penetrate each other nominally. The target must face it there. Over several triangles of the target, the nearest one counts. The result is exact for
     polyhedra and does not depend on their triangles. It is None if too many triangles overlap to cut them all.
     """
     corners, normals = np.asarray(face.mesh.triangles), np.asarray(face.mesh.face_normals)
@@ -41,8 +42,8 @@ def opposite(face: Surface, target: Surface, within: float) -> Opposite | None:
     pieces, pair = corners[rows], np.arange(len(rows))
     for k in range(3):
         pieces, pair = _above(pieces, pair, pairs.edge_distances(pair, pieces)[:, k])
-    for sign in (1, -1):
-        pieces, pair = _above(pieces, pair, within + sign * pairs.heights(pair, pieces))
+    for sign, limit in ((1, BEHIND * within), (-1, within)):
+        pieces, pair = _above(pieces, pair, limit + sign * pairs.heights(pair, pieces))
     least = MIN_AREA * face.mesh.area
     large = trimesh.triangles.area(pieces) > least
     nearest = pairs.nearest(pieces[large], pair[large], rows)
