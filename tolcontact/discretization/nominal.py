@@ -173,7 +173,8 @@ class ContactPoints:
         """The weights of the points (point,), by the areas that they represent; equal ones without sampled faces."""
         if self.moving_face is None or self.reference_face is None or self.round is not None:
             return np.ones(len(self.P_m))
-        return point_weights(self.P_m, self.within, self.moving_face, self.reference_face)
+        distance = float(np.linalg.norm(self.P_m - self.P_r, axis=1).max())
+        return point_weights(self.P_m, distance, self.moving_face, self.reference_face)
 
     @cached_property
     def regions(self) -> tuple[CountedRegion | None, CountedRegion | None]:

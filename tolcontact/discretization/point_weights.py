@@ -43,20 +43,22 @@ def counted_region(face: Surface, target: Surface, within: float) -> CountedRegi
 
     It is the part over the target, along the normals of the target, that faces it `within` a distance [mm].
     """
-    elements = _exact_elements(face, target, within) or _elements(MOST_POINTS, within, face, target)
+    elements = _exact_elements(face, target, within) or _elements(MOST_POINTS, within, face, target, by_cosines=True)
     return None if elements is None else _region(elements, face)
 
 
-def point_weights(P_m: Float[Array, "point 3"], within: float, moving: Surface, reference: Surface) -> Float[Array, " point"]:
+def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface, reference: Surface) -> Float[Array, " point"]:
     """Return weights (point,) in proportion to the area of the moving face that is nearest to each point; their mean is 1.
 
-    Only the part of the face that is opposite to the reference face `within` a distance [mm] counts (see `counted_region`).
-    Weights have the moments of this part: its area, its centre, and its second moments. They are as close as possible to the
-    nearest areas a, by the sum of (w - a)^2 / a, and each is at least a tenth of its area. With few points this may be
-    impossible: then they have area and centre, or the area alone.
+    Only the part of the face over the reference face counts, up to a `distance` [mm]. Weights have the moments of this part:
+    its area, its centre, and its second moments. They are as close as possible to the nearest areas a, by the sum of
+    (w - a)^2 / a, and each is at least a tenth of its area. With few points this may be impossible: then they have area and
+    centre, or the area alone.
     """
     # Areas of triangles that are cut along the reference face would depend on its tessellation; their moments do not.
-    exact, nearest = _exact_elements(moving, reference, within), _elements(len(P_m), within, moving, reference)
+    nearest = _elements(len(P_m), distance, moving, reference)
+    everywhere = moving.mesh.scale + reference.mesh.scale
+    exact = _exact_elements(moving, reference, everywhere) if moving.is_flat and reference.is_flat else None
     elements = exact or nearest
     if elements is None:
         return np.ones(len(P_m))
@@ -119,16 +121,19 @@ def _exact_elements(face: Surface, target: Surface, within: float) -> _Elements 
     return _Elements(region.triangles, triangles.area(region.triangles) * region.cosines, 0.0)
 
 
-def _elements(count: int, within: float, face: Surface, target: Surface) -> _Elements | None:
-    """Return small elements of a face, for a number of points, that are over a target and face it; None if there are none."""
+def _elements(count: int, distance: float, face: Surface, target: Surface, *, by_cosines: bool = False) -> _Elements | None:
+    """Return small elements of a face, for a number of points, over a target up to a distance [mm]; None if there are none.
+
+    If `by_cosines`, their areas count by the cosine of the angle between both faces.
+    """
     size = max(face.mesh.area / min(ELEMENTS_PER_POINT * count, MAX_ELEMENTS), 0.0) ** 0.5
     vertices, faces, _ = face_frame(face.mesh).subdivided(face.vertices, face.faces, EDGE * size)
     corners = vertices[faces]
     middles = corners.mean(axis=1)
     feet, normals, is_over = target.project(middles)
     crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    areas = np.maximum(-(crossed * normals).sum(axis=1), 0.0)
-    counts = is_over & (np.linalg.norm(middles - feet, axis=1) <= within) & (areas > 0)
+    areas = np.maximum(-(crossed * normals).sum(axis=1), 0.0) if by_cosines else np.linalg.norm(crossed, axis=1)
+    counts = is_over & (np.linalg.norm(middles - feet, axis=1) <= distance + size) & (areas > 0)
     return _Elements(corners[counts], areas[counts], size) if counts.any() else None
 
 
