@@ -1,7 +1,7 @@
 """Turn, mirror and scale assemblies, and compare their poses and statuses.
 
-A turned assembly is shifted, too. A mirrored one stands beside the original, and both have the same deviations. All lengths of a
-scaled one are multiplied by a factor: the raw poses show whether none was left out.
+A turned assembly is shifted, too. A mirrored one stands beside the original, and both have the same deviations. All lengths of
+a scaled one are multiplied by a factor: the raw poses show whether none was left out.
 """
 
 import argparse
@@ -18,6 +18,8 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
+from tests.cases import frames
+from tests.test_properties import AT_NIGHT, SCENES
 
 TURN, SHIFT = Rotation.from_rotvec((0.4, -1.1, 0.7)), np.array((310.0, -170.0, 90.0))  # mm
 FACTORS = 0.01, 100.0
@@ -78,7 +80,7 @@ class Original:
         return self.compared(run.rotation.values, run.translation.values / factor, run.status.values)
 
     def mirrored(self) -> tuple[float, bool]:
-        """Return how far poses of an image and of the original beside it differ [sizes], and whether it is certified as often."""
+        """Return how far poses of an image and its original differ [sizes], and whether all are certified as alone."""
         model = tc.io.model_of(self.tree)
         at = -10 * self.size
         model.mirrored(*model.parts, plane="x", at=at, names=("\0", IMAGE.strip()))
@@ -86,7 +88,9 @@ class Original:
         values = dict(zip(sample.contributor.values.tolist(), sample.deviation.values.T, strict=True))
         program = tc.build(model, solver="daqp", method=self.method)
         columns = {
-            label: values[label.replace(IMAGE, "")] for label in program.nominal.contributors if label.replace(IMAGE, "") in values
+            label: values[label.replace(IMAGE, "")]
+            for label in program.nominal.contributors
+            if label.replace(IMAGE, "") in values
         }
         model.population(columns)
         run = self._run(model, fields="none")
@@ -95,7 +99,10 @@ class Original:
         rotation, translation = run.rotation.values, run.translation.values
         shift = np.array([2 * at, 0, 0])
         t = (translation[:, :, images] + rotation[:, :, images] @ shift - shift) @ M
-        far = np.abs(t - translation[:, :, own]).max() / self.size, np.abs(M @ rotation[:, :, images] @ M - rotation[:, :, own]).max()
+        far = (
+            np.abs(t - translation[:, :, own]).max() / self.size,
+            np.abs(M @ rotation[:, :, images] @ M - rotation[:, :, own]).max(),
+        )
         return float(max(far)), bool((run.status <= tc.Status.RESOLVED).all() == (self.tree.status <= tc.Status.RESOLVED).all())
 
     def compared(self, R: np.ndarray, t: np.ndarray, status: np.ndarray) -> tuple[float, bool]:
@@ -124,9 +131,6 @@ def comparisons(original: Original) -> Iterator[tuple[str, tuple[float, bool]]]:
 
 def main() -> int:
     """Compare scenes of the property table and models; return 1 if statuses or poses differ."""
-    from tests.cases import frames
-    from tests.test_properties import AT_NIGHT, SCENES
-
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", help="scenes of tests/test_properties.py, and models; all by default")
     options = parser.parse_args()

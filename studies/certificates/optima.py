@@ -2,8 +2,8 @@
 
 For each resolved realization, an interior-point solver (ipopt) looks for poses with a smaller objective. Bodies are unions of
 convex pieces; two pieces are apart if a plane lies between them, and each plane is four unknowns of the problem. One search
-starts at the resolved pose, others at random ones. Nothing is shared with the simulation but the points, areas and locators that
-define the objective.
+starts at the resolved pose, others at random ones. Nothing is shared with the simulation but the points, areas and locators
+that define the objective.
 """
 
 import argparse
@@ -66,7 +66,9 @@ def ends_scene(seed: int, whole: bool = False) -> Scene:
 
 def case_scene(assembly: tc.Assembly, bodies: list[list[np.ndarray]], range_: float = ends.RANGE) -> Scene:
     """Return a scene whose first body is fixed, and may be touched by each of the others."""
-    return Scene(assembly, [[Polyhedron(points) for points in body] for body in bodies], [(k, 0) for k in range(1, len(bodies))], range_)
+    return Scene(
+        assembly, [[Polyhedron(points) for points in body] for body in bodies], [(k, 0) for k in range(1, len(bodies))], range_
+    )
 
 
 def placed_scene(seed: int, objective: str) -> Scene:
@@ -171,7 +173,7 @@ class Search:
 
     def least(self, raw: Poses, start: Poses, sides: list[Moments]) -> tuple[float, Poses] | None:
         """Return objective and centred poses that a search from `start` comes to; None if they penetrate each other."""
-        near = [pieces for pieces in self.pieces(start, CLOSE * self.scene.range)]
+        near = self.pieces(start, CLOSE * self.scene.range)
         near = [pieces for pieces in near if self._separation(pieces, start) < CLOSE * self.scene.range]
         if len(near) > MAX_PIECES:
             return None
@@ -207,7 +209,9 @@ class Search:
 
     def way(self, poses: Poses, others: Poses) -> float:
         """Return how far [mm] any corner is moved between two poses."""
-        moved = [self.corners[k] @ (split(poses[k])[0] - split(others[k])[0]).T + poses[k][9:] - others[k][9:] for k in self.movers]
+        moved = [
+            self.corners[k] @ (split(poses[k])[0] - split(others[k])[0]).T + poses[k][9:] - others[k][9:] for k in self.movers
+        ]
         return max(float(np.linalg.norm(each, axis=1).max()) for each in moved)
 
 
@@ -276,7 +280,9 @@ def at_random(rng, poses: Poses, search: Search) -> Poses:
         R, t = split(poses[k])
         centre = search.corners[k].mean(axis=0)
         turned = Rotation.from_rotvec(rng.normal(size=3) * turn).as_matrix() @ R
-        others[k] = np.concatenate([turned.ravel(), R @ centre + t - turned @ centre + rng.normal(size=3) * shift * search.scene.range])
+        others[k] = np.concatenate(
+            [turned.ravel(), R @ centre + t - turned @ centre + rng.normal(size=3) * shift * search.scene.range]
+        )
     return others
 
 
@@ -315,10 +321,19 @@ def main() -> int:
     began = time.perf_counter()
     for seed in range(options.first, options.first + options.scenes):
         try:
-            scene = placed_scene(seed, options.objective) if options.scenes_of == "coincidences" else ends_scene(seed, options.scenes_of == "whole")
+            scene = (
+                placed_scene(seed, options.objective)
+                if options.scenes_of == "coincidences"
+                else ends_scene(seed, options.scenes_of == "whole")
+            )
             with quick_builds():
                 rows = judged(
-                    scene, samples=options.samples, seed=seed, objective=options.objective, solver=options.solver, starts=options.starts
+                    scene,
+                    samples=options.samples,
+                    seed=seed,
+                    objective=options.objective,
+                    solver=options.solver,
+                    starts=options.starts,
                 )
         except tc.ModelError as error:
             counts["refused"] += 1

@@ -196,7 +196,13 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
     if any(pair.is_springy for pair in pairs):
         stiffness = [np.full(len(pair.P_m), np.inf) if pair.stiffness is None else pair.stiffness for pair in pairs]
         values[terms.POINT_STIFFNESS] = np.concatenate(stiffness)
-    values |= _objective_values(program) | _bounded_values(program) | _coordinate_values(nominal) | _round_values(nominal) | _face_values(nominal)
+    values |= (
+        _objective_values(program)
+        | _bounded_values(program)
+        | _coordinate_values(nominal)
+        | _round_values(nominal)
+        | _face_values(nominal)
+    )
     return values | form_values(program) | datum_values(program)
 
 

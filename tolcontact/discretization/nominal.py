@@ -186,7 +186,7 @@ class ContactPoints:
 
     @property
     def area(self) -> float:
-        """The area [mm^2] of the moving face that an objective counts; 0 without faces, or if no part is opposite to the other."""
+        """The area [mm^2] of the moving face that an objective counts; 0 if no part is opposite to the other face."""
         return 0.0 if self.regions[0] is None else self.regions[0].area
 
     @cached_property

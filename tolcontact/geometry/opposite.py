@@ -27,8 +27,9 @@ class Opposite(NamedTuple):
 def opposite(face: Surface, target: Surface, within: float) -> Opposite | None:
     """Return the part of a face that is over the target, along its normals, within a distance [mm] in front of it.
 
-    A tenth of this distance behind it counts, too, since bodies may penetrate each other nominally. The target must face it there. Over several triangles of the target, the nearest one counts. The result is exact for
-    polyhedra and does not depend on their triangles. It is None if too many triangles overlap to cut them all.
+    A tenth of this distance behind it counts, too, since bodies may penetrate each other nominally. The target must face it
+    there. Over several triangles of the target, the nearest one counts. The result is exact for polyhedra and does not depend
+    on their triangles. It is None if too many triangles overlap to cut them all.
     """
     corners, normals = np.asarray(face.mesh.triangles), np.asarray(face.mesh.face_normals)
     target_corners, target_normals = np.asarray(target.mesh.triangles), np.asarray(target.mesh.face_normals)

@@ -1,30 +1,16 @@
-"""The part of a face that is opposite to another one: exact, and the same for other triangles, in other frames, and mirrored."""
+"""The part of a face that is opposite to another one: exact, and the same for other triangles, frames, and mirrored."""
 
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from tests.cases.blocks import combs
 from tolcontact.geometry.opposite import opposite
 from tolcontact.geometry.surface import Surface
 
 TURN, SHIFT = Rotation.from_rotvec((0.4, -1.1, 0.7)).as_matrix(), np.array((31.0, -17.0, 90.0))
 MIRROR = np.diag([-1.0, 1.0, 1.0])
-
-
-def comb(teeth, width, pitch=10.0, height=8.0):
-    """A comb whose teeth stand on z = 0."""
-    back = trimesh.creation.box(bounds=[[0, 0, -3], [teeth * pitch, 20, 0]])
-    bounds = [[[k * pitch, 0, 0], [k * pitch + width, 20, height]] for k in range(teeth)]
-    return trimesh.boolean.union([back, *(trimesh.creation.box(bounds=low_high) for low_high in bounds)], engine="manifold")
-
-
-def combs():
-    """A comb in another one: teeth 4.0 mm wide in grooves of 4.2 mm, whose tips are 0.1 mm apart from the ground."""
-    lower, upper = comb(6, 5.8), comb(5, 4.0)
-    upper.vertices = upper.vertices * [1, 1, -1] + [5.9, 0, 8.1]
-    upper.invert()
-    return upper, lower
 
 
 def moments(face, target, within, R=None, t=(0, 0, 0)):
@@ -42,9 +28,7 @@ def moments(face, target, within, R=None, t=(0, 0, 0)):
 
 
 def test_the_walls_of_a_box_on_a_table_are_not_opposite_to_it():
-    box, table = (
-        trimesh.creation.box(bounds=bounds) for bounds in ([[30, 15, 0], [70, 45, 10]], [[0, 0, -10], [60, 60, 0]])
-    )
+    box, table = (trimesh.creation.box(bounds=bounds) for bounds in ([[30, 15, 0], [70, 45, 10]], [[0, 0, -10], [60, 60, 0]]))
     area, centre, second = moments(box, table, 5)
     assert area == pytest.approx(30 * 30) and np.allclose(centre, (45, 30, 0))
     assert np.allclose(second, np.diag([75, 75, 0]), atol=1e-9)
