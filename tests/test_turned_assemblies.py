@@ -186,6 +186,7 @@ def test_a_box_on_a_table_is_the_same_by_faces_and_as_a_whole():
         assert np.array_equal(others, status) and np.abs(heights - expected).max() < 1e-8
 
 
+@pytest.mark.nightly
 def test_a_comb_in_a_comb_is_the_same_in_any_frame_with_any_points():
     expected, status = heights_of(*combs(), points=60, samples=6)
     for choice in ({"turn": TURNS[0], "points": 60}, {"points": 100}):
