@@ -107,6 +107,9 @@ class Original:
 
     def compared(self, R: np.ndarray, t: np.ndarray, status: np.ndarray) -> tuple[float, bool]:
         rotation, translation = self.tree.rotation.values, self.tree.translation.values
+        raw = np.abs(t - translation)[:, 0].max() / self.size
+        if raw > LIMIT:
+            raise ValueError(f"raw poses differ by {raw:.1e}: this model has lengths that the change leaves out")
         far = np.abs(t - translation).max() / self.size, np.abs(R - rotation).max()
         return float(max(far)), bool(np.array_equal(status, self.tree.status.values))
 
