@@ -147,7 +147,7 @@ class Search:
                 a = applied(poses[part], centre - self.centre) - applied(raw[part], centre - self.centre)
                 value += weight * (ca.dot(a, a) + ca.trace(D @ ca.DM(products) @ D.T)) / 2
                 total += weight
-        return value / total
+        return value / (total or 1.0)  # no active point counts: any pose is as good
 
     def distance(self, poses: Poses) -> float:
         """Return the least signed distance [mm] of bodies that may touch, at centred poses."""

@@ -14,7 +14,7 @@ from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.measured_geometry import NominalMeasurement
 from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
-from tolcontact.discretization.point_weights import CountedRegion, counted_region, point_weights
+from tolcontact.discretization.point_weights import CountedRegion, counted_regions, point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.weld import ElasticInputs, Weld
 from tolcontact.features import Expansion, FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
@@ -97,8 +97,7 @@ class ContactPoints:
         sides, which is as good. An end of a shaft's axis has no radius, since the other end holds the shaft.
         """
         if self.round is None or not self.round.are_beside:
-            points = self.P_m if of_moving else self.P_r
-            return points, np.zeros(len(points))
+            return (self.P_m if of_moving else self.P_r), np.zeros(len(self.P_m))
         centres, radii = zip(*(point.curvature(of_moving=of_moving) for point in self.round), strict=True)
         is_end = self.round.points["axis"].any(axis=1) & (self.round.points["on_moving"] == of_moving)
         return np.array(centres), np.where(is_end, 0.0, radii)
@@ -173,28 +172,18 @@ class ContactPoints:
         """The weights of the points (point,), by the areas that they represent; equal ones without sampled faces."""
         if self.moving_face is None or self.reference_face is None or self.round is not None:
             return np.ones(len(self.P_m))
-        distance = float(np.linalg.norm(self.P_m - self.P_r, axis=1).max())
-        return point_weights(self.P_m, distance, self.moving_face, self.reference_face)
+        return point_weights(self.P_m, self.P_r, self.moving_face, self.reference_face)
 
     @cached_property
     def regions(self) -> tuple[CountedRegion | None, CountedRegion | None]:
-        """The parts of the moving and of the reference face that an objective counts; None without faces or such a part."""
-        moving, reference = self.moving_face, self.reference_face
-        if moving is None or reference is None:
-            return None, None
-        return counted_region(moving, reference, self.within), counted_region(reference, moving, self.within)
-
-    @property
-    def area(self) -> float:
-        """The area [mm^2] of the moving face that an objective counts; 0 if no part is opposite to the other face."""
-        return 0.0 if self.regions[0] is None else self.regions[0].area
+        """The parts of the moving and of the reference face that an objective counts."""
+        return counted_regions(self.moving_face, self.reference_face, self.within)
 
     @cached_property
     def bulge(self) -> float:
         """The largest height [mm] of round surfaces over the triangles that they were fitted to and replace."""
-        faces = [face for face in (self.moving_face, self.reference_face) if face is not None]
-        pieces = [piece.face for face in faces for piece in face.pieces if piece.surface.is_fitted]
-        return max((piece.chord_height for piece in pieces), default=0.0)
+        pieces = [piece for face in (self.moving_face, self.reference_face) if face is not None for piece in face.pieces]
+        return max((piece.face.chord_height for piece in pieces if piece.surface.is_fitted), default=0.0)
 
     @property
     def in_words(self) -> str:

@@ -38,6 +38,15 @@ class CountedRegion(NamedTuple):
         return float(self.shares.sum())
 
 
+def counted_regions(
+    moving: Surface | None, reference: Surface | None, within: float
+) -> tuple[CountedRegion | None, CountedRegion | None]:
+    """Return the parts of both faces of a pair that an objective counts; None without faces, or if there is no such part."""
+    if moving is None or reference is None:
+        return None, None
+    return counted_region(moving, reference, within), counted_region(reference, moving, within)
+
+
 def counted_region(face: Surface, target: Surface, within: float) -> CountedRegion | None:
     """Return the part of a face that an objective counts; None if no part of it is opposite to the target.
 
@@ -47,16 +56,18 @@ def counted_region(face: Surface, target: Surface, within: float) -> CountedRegi
     return None if elements is None else _region(elements, face)
 
 
-def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface, reference: Surface) -> Float[Array, " point"]:
+def point_weights(
+    P_m: Float[Array, "point 3"], P_r: Float[Array, "point 3"], moving: Surface, reference: Surface
+) -> Float[Array, " point"]:
     """Return weights (point,) in proportion to the area of the moving face that is nearest to each point; their mean is 1.
 
-    Only the part of the face over the reference face counts, up to a `distance` [mm]. Weights have the moments of this part:
-    its area, its centre, and its second moments. They are as close as possible to the nearest areas a, by the sum of
-    (w - a)^2 / a, and each is at least a tenth of its area. With few points this may be impossible: then they have area and
-    centre, or the area alone.
+    Only the part of the face over the reference face counts, up to the distance of the farthest point from its foot P_r.
+    Weights have the moments of this part: its area, its centre, and its second moments. They are as close as possible to the
+    nearest areas a, by the sum of (w - a)^2 / a, and each is at least a tenth of its area. With few points this may be
+    impossible: then they have area and centre, or the area alone.
     """
     # Areas of triangles that are cut along the reference face would depend on its tessellation; their moments do not.
-    nearest = _elements(len(P_m), distance, moving, reference)
+    nearest = _elements(len(P_m), float(np.linalg.norm(P_m - P_r, axis=1).max()), moving, reference)
     everywhere = moving.mesh.scale + reference.mesh.scale
     exact = _exact_elements(moving, reference, everywhere) if moving.is_flat and reference.is_flat else None
     elements = exact or nearest

@@ -239,13 +239,18 @@ def _points_near(
     return points[part] or points[mover] or [P for other in points if chains[other] == chains[mover] for P in points[other]]
 
 
+def _area(pair: ContactPoints) -> float:
+    """Return the area [mm^2] of the moving face that counts; 0 without faces, or if no part is opposite to the other face."""
+    return 0.0 if pair.regions[0] is None else pair.regions[0].area
+
+
 def _points_per_area(pairs: Sequence[ContactPoints]) -> float:
     """Return the number of contact points per area [1/mm^2] of the faces that count, in all pairs that have such faces.
 
     The product of this density and an area is about a number of points, so that a point of a pair without such faces counts as
     a point of the others. It is 1 if no pair has them.
     """
-    counted = [(len(pair.P_m), pair.area) for pair in pairs if pair.area > 0]
+    counted = [(len(pair.P_m), _area(pair)) for pair in pairs if _area(pair) > 0]
     return sum(count for count, _ in counted) / sum(area for _, area in counted) if counted else 1.0
 
 
@@ -265,8 +270,8 @@ def _side(
     """
     counted, points = pair.counted(of_moving=of_moving), pair.P_m if of_moving else pair.P_r
     weights, face_moments = pair.weights if method.is_exact else np.ones(len(points)), None
-    if method.counts_faces and pair.area > 0:
-        weights = weights * (pair.area * density / len(points))
+    if method.counts_faces and _area(pair) > 0:
+        weights = weights * (_area(pair) * density / len(points))
         region = pair.regions[0 if of_moving else 1]
         if region is not None and pair.round is None:
             face_moments = moment_table(region.places, centre) @ region.shares * density
