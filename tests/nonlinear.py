@@ -67,11 +67,17 @@ class TrueProblem:
         """1/2 sum of squared displacements: of the points that count, and of all points as small balls; their numbers."""
         motion, held, count, points = 0, 0, 0, 0
         for pair, weight in zip(self.nominal.pairs, weights, strict=True):
-            for part, P in ((pair.moving, pair.P_m), (pair.reference, pair.P_r)):
+            regions = pair.regions if self.objective == "all points" and pair.round is None else (None, None)
+            for part, P, region in zip((pair.moving, pair.reference), (pair.P_m, pair.P_r), regions, strict=True):
                 if part in self.free:
                     squares = ca.sum1((at(new, part, P) - at(raw, part, P)) ** 2)
-                    motion += ca.dot(weight, squares) / 2
-                    count += ca.sum2(weight)
+                    if region is None:
+                        motion += ca.dot(weight, squares) / 2
+                        count += ca.sum2(weight)
+                    else:  # the faces count, by their areas
+                        moved = ca.sum1((at(new, part, region.places) - at(raw, part, region.places)) ** 2)
+                        motion += ca.dot(ca.DM(region.shares[None]), moved) / 2
+                        count += region.area
                     turn = ca.sumsqr(turned(new, part) - turned(raw, part))
                     held += ca.dot(ca.DM(pair.weights[None]), squares) / 2 + len(P) * (BALL * self.length) ** 2 * turn / 2
                     points += len(P)

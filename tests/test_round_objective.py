@@ -71,7 +71,7 @@ def test_an_archive_says_that_centres_count(tmp_path):
     path = tmp_path / "foot.nc"
     tc.run(a, samples=20, seed=1, surfaces=0, out=path).close()
     with netCDF4.Dataset(path, "r+") as file:
-        assert file.weighting == "all points, by area and its moments, balls and shafts by their centres"
+        assert file.weighting == "all points, as opposite faces by their moments, balls and shafts by their centres"
         file.weighting = "all points, by area"
     with pytest.raises(tc.TolcontactError, match="was run with weighting = all points, by area, now it is"):
         tc.run(a, samples=30, seed=1, surfaces=0, out=path, resume=True)

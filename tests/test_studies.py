@@ -27,6 +27,7 @@ STUDIES = {
     "cad/trimmed_faces.py": [ROOT / "models" / "cover.step"],
     "certificates/coincidences.py": ["--scenes", "6", "--samples", "3"],
     "certificates/ends.py": ["--scenes", "6", "--samples", "3"],
+    "certificates/frames.py": ["a pattern"],
     "certificates/judge.py": ["--scenes", "3", "--samples", "20"],
     "certificates/optima.py": ["--first", "6000", "--scenes", "2", "--samples", "3", "--starts", "1"],
     "cost/cluster.py": ["--samples", "20000", "--to", "."],

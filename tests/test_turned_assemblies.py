@@ -6,6 +6,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
+from tests.cases.blocks import combs
 from tests.helpers import nightly, simulate
 from tolcontact.discretization import discretize
 
@@ -152,3 +153,60 @@ def test_exact_answers_do_not_depend_on_the_number_of_points():
     runs = [simulate(plates("L", points=points), samples=100, solver="daqp")[1] for points in (40, 200, 1000)]
     heights = [run["measured"][:, 1, 0] for run in runs]
     assert max(np.abs(height - heights[-1]).max() for height in heights) < 1e-7
+
+
+def pressed(upper, lower, turn=None, *, faces=((), ()), **choice):
+    """A body on another one, both meshes, turned and shifted; faces by selectors, whole surfaces by default."""
+    R, t = (Rotation.identity(), np.zeros(3)) if turn is None else (turn, SHIFT)
+    bodies = [trimesh.Trimesh(R.apply(np.array(mesh.vertices)) + t, mesh.faces, process=False) for mesh in (lower, upper)]
+    a = tc.Assembly("pressed")
+    base, top = a.part("base", tc.Mesh(bodies[0]), fixed=True), a.part("top", tc.Mesh(bodies[1]))
+    low, high = np.array(upper.bounds)
+    points = np.array([(0.1, 0.1, 0), (0.9, 0.1, 0), (0.5, 0.9, 0), (0.1, 0, 0.5), (0.9, 0, 0.5), (0, 0.5, 0.5)])
+    places = zip("ABCDEF", R.apply(low + points * (high - low)) + t, R.apply(DIRECTIONS), strict=True)
+    a.locate(top, [tc.Locator(label, tuple(p), tuple(n)) for label, p, n in places], tolerance=0.3)
+    a.contact("contact", moving=top.face(*faces[0]), reference=base.face(*faces[1]), **choice)
+    a.measure("height", top.point(*(R.apply(high) + t)), along=tuple(R.apply((0, 0, 1))), tolerance=1)
+    return a
+
+
+def heights_of(*arguments, samples=30, **choice):
+    _, run = simulate(pressed(*arguments, **choice), samples=samples, solver="daqp", method=tc.Method())
+    assert (run["status"] == 1).any()
+    return run["measured"][:, 1, 0], run["status"]
+
+
+def test_a_box_on_a_table_is_the_same_by_faces_and_as_a_whole():
+    """The walls of the box are not opposite to the table, however many points lie on them."""
+    boxes = [trimesh.creation.box(bounds=bounds) for bounds in ([[30, 15, 0], [70, 45, 10]], [[0, 0, -10], [100, 60, 0]])]
+    sides = (tc.select.Facing((0, 0, -1)),), (tc.select.Facing((0, 0, 1)),)
+    expected, status = heights_of(*boxes, faces=sides)
+    for choice in ({}, {"points": 50}, {"within": 1.0}, {"turn": TURNS[0]}):
+        heights, others = heights_of(*boxes, **choice)
+        assert np.array_equal(others, status) and np.abs(heights - expected).max() < 1e-8
+
+
+@pytest.mark.nightly
+def test_a_comb_in_a_comb_is_the_same_in_any_frame_with_any_points():
+    expected, status = heights_of(*combs(), points=60, samples=6)
+    for choice in ({"turn": TURNS[0], "points": 60}, {"points": 100}):
+        heights, others = heights_of(*combs(), samples=6, **choice)
+        assert np.array_equal(others, status) and np.abs(heights - expected).max() < 1e-7
+
+
+def test_two_pairs_count_by_their_areas_whatever_their_points():
+    """A plate on a large and a small pad: as many points on the small one would double its weight."""
+
+    def plate(points):
+        a = tc.Assembly("pads")
+        top = a.part("top", tc.Box(60, 20, 4), at=(0, 0, 10))
+        a.locate(top, tc.three_two_one(top.face("-z"), top.face("-y"), top.face("-x"), inset=3), tolerance=0.5)
+        for (name, x, width), count in zip((("large", 0, 30), ("small", 50, 10)), points, strict=True):
+            pad = a.part(name, tc.Box(width, 20, 10), at=(x, 0, 0), fixed=True)
+            a.contact(name, moving=top.face("-z"), reference=pad.face("+z"), points=count)
+        a.measure("height", top.point(60, 20, 0), along="z", tolerance=1)
+        return a
+
+    method = tc.Method()
+    few, many = (simulate(plate(points), samples=40, solver="daqp", method=method)[1] for points in ((30, 30), (30, 300)))
+    assert np.abs(few["measured"] - many["measured"]).max() < 1e-8

@@ -12,7 +12,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER, simulate
+from tests.helpers import PAPER, joined, simulate
 from tolcontact.errors import ArchiveError
 
 SEATED = {"resolution": "exact", "objective": "seating"}
@@ -79,7 +79,7 @@ def test_the_settings_of_a_run_are_its_attributes(archive):
 @pytest.mark.slow
 def test_the_weighting_is_that_of_points_where_points_count():
     for objective, weighting, units in (
-        ("all points", "all points, by area and its moments", "mm"),
+        ("all points", "all points, as opposite faces by their moments", "mm"),
         ("locator stiffness", "none", "N"),
     ):
         found = tc.run(cases.stack(), samples=5, solver="daqp", method={"objective": objective})
@@ -87,6 +87,31 @@ def test_the_weighting_is_that_of_points_where_points_count():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("model", [cases.ra1, cases.stack, cases.peg_in_a_hole])
+def test_the_moments_of_faces_give_the_objective(tmp_path, model):
+    """The mean square displacement of faces follows from the file alone, and is the objective that was minimized."""
+    program = tc.build(model(), solver="daqp", method=tc.Method())
+    tc.run(program, samples=5, seed=3, out=tmp_path / "run.nc", surfaces=4).close()
+    with xr.open_datatree(tmp_path / "run.nc") as tree:
+        contact, R, t = tree["contact"], tree["rotation"].values, tree["translation"].values
+        value, total = 0.0, 0.0
+        for pair in range(contact.sizes["pair"]):
+            for side, part in enumerate((int(contact.moving_part[pair]), int(contact.reference_part[pair]))):
+                area, centre = float(contact.objective_area[pair, side]), contact.objective_centre[pair, side].values
+                turn, shift = (values[:, 1, part] - values[:, 0, part] for values in (R, t))
+                mean = turn @ centre + shift
+                spread = np.einsum("nij,jk,nik->n", turn, contact.objective_moment[pair, side].values, turn)
+                value, total = value + area * ((mean**2).sum(axis=1) + spread) / 2, total + area
+    (group,) = program.groups
+    block = joined(tc.simulate_blocks(program, samples=5, seed=3))
+    supports = [program.nominal.pairs[group.group.pairs[side.pair]].is_supports for side in group.group.sides]
+    moments = np.array([np.zeros(10) if zero else side.moments for zero, side in zip(supports, group.group.sides, strict=True)])
+    raw, poses = (block["poses"][:, state][:, list(group.group.parts)] for state in (0, 1))
+    inputs = {"raw": raw, "moments": np.tile(moments, (5, 1, 1)), "deviations": block["deviations"]}
+    energy = group.solve.energy(poses=poses, **inputs)
+    np.testing.assert_allclose(value / total, energy, rtol=1e-4, atol=1e-12)  # but for the regularization
+
+
 def test_units_of_measures():
     a = cases.one_dimensional(6)
     block = a.parts[1]

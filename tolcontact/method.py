@@ -120,6 +120,11 @@ class Method:
         return self.resolution == "exact"
 
     @property
+    def counts_faces(self) -> bool:
+        """Whether the objective counts faces, by the moments of the parts that are opposite to each other, not points."""
+        return self.is_exact and self.minimizes.counts_all
+
+    @property
     def is_bounded(self) -> bool:
         """Whether faces end, and touch at corners, edges and facets of both bodies."""
         return self.search == "bounded"

@@ -1,6 +1,7 @@
 """Blocks: flat faces, alone or in a row."""
 
 import numpy as np
+import trimesh
 from scipy.stats import uniform
 
 import tolcontact as tc
@@ -164,3 +165,18 @@ def square_pins(varies: str = "both") -> tc.Assembly:
         a.contact(f"right {k}", moving=right[0].face("+x"), reference=right[1].face("-x"), points="vertices")
     a.measure("slide", plate.point(0, 0, 0), along="x", tolerance=1)
     return a
+
+
+def comb(teeth, width, pitch=10.0, height=8.0):
+    """A comb whose teeth stand on z = 0."""
+    back = trimesh.creation.box(bounds=[[0, 0, -3], [teeth * pitch, 20, 0]])
+    bounds = [[[k * pitch, 0, 0], [k * pitch + width, 20, height]] for k in range(teeth)]
+    return trimesh.boolean.union([back, *(trimesh.creation.box(bounds=low_high) for low_high in bounds)], engine="manifold")
+
+
+def combs():
+    """A comb in another one: teeth 4.0 mm wide in grooves of 4.2 mm, whose tips are 0.1 mm apart from the ground."""
+    lower, upper = comb(6, 5.8), comb(5, 4.0)
+    upper.vertices = upper.vertices * [1, 1, -1] + [5.9, 0, 8.1]
+    upper.invert()
+    return upper, lower

@@ -19,6 +19,7 @@ from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry import known_surfaces, surface_arrays
 from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, coordinate_spacing
+from tolcontact.mechanics.displacement import central_moments
 from tolcontact.simulation.locator_offsets import locator_variations
 from tolcontact.simulation.other_objectives import compared_objectives, empty_by_objective
 from tolcontact.vocabulary import ArchiveVariable
@@ -195,8 +196,30 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
     if any(pair.is_springy for pair in pairs):
         stiffness = [np.full(len(pair.P_m), np.inf) if pair.stiffness is None else pair.stiffness for pair in pairs]
         values[terms.POINT_STIFFNESS] = np.concatenate(stiffness)
-    values |= _bounded_values(program) | _coordinate_values(nominal) | _round_values(nominal) | _face_values(nominal)
+    values |= (
+        _objective_values(program)
+        | _bounded_values(program)
+        | _coordinate_values(nominal)
+        | _round_values(nominal)
+        | _face_values(nominal)
+    )
     return values | form_values(program) | datum_values(program)
+
+
+def _objective_values(program: Program) -> dict[ArchiveVariable, Any]:
+    """Return the moments of the faces that the objective counts; none if it does not count faces."""
+    if not program.method.counts_faces:
+        return {}
+    count = len(program.nominal.pairs)
+    areas, centres, seconds = np.zeros((count, 2)), np.zeros((count, 2, 3)), np.zeros((count, 2, 3, 3))
+    for group in (compiled.group for compiled in program.groups):
+        for side in group.sides:
+            number, index = group.pairs[side.pair], 1 - side.is_moving
+            if not program.nominal.pairs[number].is_supports:
+                areas[number, index] = side.moments[0] / side.density
+                centres[number, index], seconds[number, index] = central_moments(np.asarray(side.centre), side.moments)
+    values = [terms.SIDES, areas, centres, seconds]
+    return dict(zip(terms.OBJECTIVE, values, strict=True))
 
 
 def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:

@@ -91,7 +91,13 @@ def _weighting(program: Program) -> str:
     method = program.method
     if not method.minimizes.counts_points:
         return "none"
-    by_area = ", by area and its moments" if method.is_exact else ""
+    by_area = (
+        ", as opposite faces by their moments"
+        if method.counts_faces
+        else ", by area and its moments"
+        if method.is_exact
+        else ""
+    )
     are_centres = any(pair.round is not None and pair.round.are_beside for pair in program.nominal.pairs)
     return f"{method.objective}{by_area}{', balls and shafts by their centres' if are_centres else ''}"
 

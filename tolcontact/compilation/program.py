@@ -164,7 +164,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         values = measured(nominal, poses_of(entries), d)
         place, observe = _place(nominal, d), _observe(nominal, entries, d, values)
         bodies = elastic_bodies(nominal)
-        groups = [with_weights(group, nominal, bodies) for group in contact_groups(nominal, weighs_areas=method.is_exact)]
+        groups = [with_weights(group, nominal, bodies) for group in contact_groups(nominal, method)]
         if method.minimizes.presses:
             check_forces(nominal, groups)
         watch = _watch(nominal, draws, place)

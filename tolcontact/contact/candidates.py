@@ -91,6 +91,8 @@ class Candidates:
         self._standing, self._spans = group.qp.standing, group.qp.spans
         self._varying = [k for k, points in enumerate(self._standing) if isinstance(points, int)]
         self._all_scans: list[RoundScan | FixedScan] = []
+        sides = group.group.sides
+        self._totals = [np.array([side.moments for side in sides if side.pair == k]) for k in range(len(group.group.pairs))]
         self._carrying_scans: list[RoundScan | FixedScan] = []
         for position, index in enumerate(group.group.pairs):
             pair, gaps = program.nominal.pairs[index], program.gaps[index]
@@ -295,8 +297,7 @@ class Candidates:
             return np.zeros_like(active)
         if not self._method.minimizes.counts_all:
             return active
-        total = np.array([table.sum(axis=1) for table in self._all_scans[k].tables]).reshape(active.shape[1:])
-        return np.broadcast_to(total, active.shape)
+        return np.broadcast_to(self._totals[k].reshape(active.shape[1:]), active.shape)
 
     def may_carry(
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]

@@ -90,6 +90,7 @@ def contact_points(
         offsets=Offsets.joined([], len(P_m)),
         reference_face=reference_face,
         moving_face=moving_face,
+        within=reach,
         coordinate_error=rounding,
         facets=facet_error(moving_face, reference_face, reach),
         sampling_error=undetected,

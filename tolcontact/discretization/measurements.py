@@ -76,7 +76,7 @@ def face_gap(moving: MeasuredFace, reference: MeasuredFace, is_largest: bool) ->
             f"its faces {moving.face} and {reference.face} do not face each other everywhere; choose faces with material "
             "behind both"
         )
-    weights = point_weights(places, float(np.linalg.norm(places - feet, axis=1).max()), moving.surface, reference.surface)
+    weights = point_weights(places, feet, moving.surface, reference.surface)
     points = [
         (MeasuredPoint(moving.part, place, moving.deviation, direction), reference.wall(place))
         for place, direction in zip(places, outward, strict=True)

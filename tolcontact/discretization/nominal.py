@@ -14,7 +14,7 @@ from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.measured_geometry import NominalMeasurement
 from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
-from tolcontact.discretization.point_weights import point_weights
+from tolcontact.discretization.point_weights import CountedRegion, counted_regions, point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.weld import ElasticInputs, Weld
 from tolcontact.features import Expansion, FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
@@ -39,6 +39,7 @@ class ContactPoints:
     is the part that they are on, or None for the ground. They have no faces; their offsets are the deviations.
 
     moving_face, reference_face   in their nominal poses
+    within      [mm] how far from each other opposite faces count in an objective
     coordinate_error   [mm] of both bodies, as their files store them: P_r lie below the reference face by it
     facets      [mm] largest distance between their triangles and the round faces that these approximate
     sampling_error   [mm] that bodies may penetrate undetected between points of curved faces; None for other points
@@ -60,6 +61,7 @@ class ContactPoints:
     offsets: Offsets
     reference_face: Surface | None = None
     moving_face: Surface | None = None
+    within: float = np.inf
     coordinate_error: float = 0.0
     facets: float = 0.0
     sampling_error: float | None = None
@@ -95,8 +97,7 @@ class ContactPoints:
         sides, which is as good. An end of a shaft's axis has no radius, since the other end holds the shaft.
         """
         if self.round is None or not self.round.are_beside:
-            points = self.P_m if of_moving else self.P_r
-            return points, np.zeros(len(points))
+            return (self.P_m if of_moving else self.P_r), np.zeros(len(self.P_m))
         centres, radii = zip(*(point.curvature(of_moving=of_moving) for point in self.round), strict=True)
         is_end = self.round.points["axis"].any(axis=1) & (self.round.points["on_moving"] == of_moving)
         return np.array(centres), np.where(is_end, 0.0, radii)
@@ -171,15 +172,18 @@ class ContactPoints:
         """The weights of the points (point,), by the areas that they represent; equal ones without sampled faces."""
         if self.moving_face is None or self.reference_face is None or self.round is not None:
             return np.ones(len(self.P_m))
-        distance = float(np.linalg.norm(self.P_m - self.P_r, axis=1).max())
-        return point_weights(self.P_m, distance, self.moving_face, self.reference_face)
+        return point_weights(self.P_m, self.P_r, self.moving_face, self.reference_face)
+
+    @cached_property
+    def regions(self) -> tuple[CountedRegion | None, CountedRegion | None]:
+        """The parts of the moving and of the reference face that an objective counts."""
+        return counted_regions(self.moving_face, self.reference_face, self.within)
 
     @cached_property
     def bulge(self) -> float:
         """The largest height [mm] of round surfaces over the triangles that they were fitted to and replace."""
-        faces = [face for face in (self.moving_face, self.reference_face) if face is not None]
-        pieces = [piece.face for face in faces for piece in face.pieces if piece.surface.is_fitted]
-        return max((piece.chord_height for piece in pieces), default=0.0)
+        pieces = [piece for face in (self.moving_face, self.reference_face) if face is not None for piece in face.pieces]
+        return max((piece.face.chord_height for piece in pieces if piece.surface.is_fitted), default=0.0)
 
     @property
     def in_words(self) -> str:

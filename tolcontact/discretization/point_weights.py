@@ -1,17 +1,19 @@
-"""Weights of contact points: the areas that they represent, with the moments of the face."""
+"""The region of faces that an objective counts, and the weights of contact points: the areas of it that they represent."""
 
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
+from trimesh import triangles
 
 from tolcontact.arrays import Array, Float
-from tolcontact.geometry.common_region import common_region
+from tolcontact.geometry.opposite import opposite
 from tolcontact.geometry.spreading import face_frame
 from tolcontact.geometry.surface import Surface
 
 ELEMENTS_PER_POINT = 16
 MAX_ELEMENTS = 200_000
+MOST_POINTS = 1000  # whose elements represent faces with too many triangles to cut
 EDGE = 2.0137  # of the largest edge of an element, in its size: no edge of a model is just as long as that
 NEIGHBOURS = 8  # at most, which share an element that is equally near to them
 TIE = 1e-6  # of the size of an element
@@ -21,26 +23,59 @@ MAX_STEPS = 60
 CONDITIONS = (10, 4)  # moments of the orders 0 to 2, or of 0 and 1
 
 
-def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface, reference: Surface) -> Float[Array, " point"]:
+class CountedRegion(NamedTuple):
+    """The part of a face that is opposite to another one: its area [mm^2], places (place, 3) [mm], and their `shares` (place,).
+
+    Sums over places with their shares [mm^2] are integrals of quadratic functions: exact for polyhedra.
+    """
+
+    places: Float[Array, "place 3"]
+    shares: Float[Array, " place"]
+
+    @property
+    def area(self) -> float:
+        """The area [mm^2]; where the faces are not parallel, it counts by the cosine of the angle between them."""
+        return float(self.shares.sum())
+
+
+def counted_regions(
+    moving: Surface | None, reference: Surface | None, within: float
+) -> tuple[CountedRegion | None, CountedRegion | None]:
+    """Return the parts of both faces of a pair that an objective counts; None without faces, or if there is no such part."""
+    if moving is None or reference is None:
+        return None, None
+    return counted_region(moving, reference, within), counted_region(reference, moving, within)
+
+
+def counted_region(face: Surface, target: Surface, within: float) -> CountedRegion | None:
+    """Return the part of a face that an objective counts; None if no part of it is opposite to the target.
+
+    It is the part over the target, along the normals of the target, that faces it `within` a distance [mm].
+    """
+    elements = _exact_elements(face, target, within) or _elements(MOST_POINTS, within, face, target, by_cosines=True)
+    return None if elements is None else _region(elements, face)
+
+
+def point_weights(
+    P_m: Float[Array, "point 3"], P_r: Float[Array, "point 3"], moving: Surface, reference: Surface
+) -> Float[Array, " point"]:
     """Return weights (point,) in proportion to the area of the moving face that is nearest to each point; their mean is 1.
 
-    Only the part of the face over the reference face counts, up to a `distance` [mm]. Weights have the moments of this part:
-    its area, its centre, and its second moments. They are as close as possible to the nearest areas a, by the sum of
-    (w - a)^2 / a, and each is at least a tenth of its area. With few points this may be impossible: then they have area and
-    centre, or the area alone.
+    Only the part of the face over the reference face counts, up to the distance of the farthest point from its foot P_r.
+    Weights have the moments of this part: its area, its centre, and its second moments. They are as close as possible to the
+    nearest areas a, by the sum of (w - a)^2 / a, and each is at least a tenth of its area. With few points this may be
+    impossible: then they have area and centre, or the area alone.
     """
-    nearest = _elements(P_m, distance, moving, reference)
-    region = common_region(moving, reference) if moving.is_flat and reference.is_flat else None
     # Areas of triangles that are cut along the reference face would depend on its tessellation; their moments do not.
-    elements = nearest if region is None else _elements(P_m, distance, moving, reference, region, is_fine=nearest is None)
+    nearest = _elements(len(P_m), float(np.linalg.norm(P_m - P_r, axis=1).max()), moving, reference)
+    everywhere = moving.mesh.scale + reference.mesh.scale
+    exact = _exact_elements(moving, reference, everywhere) if moving.is_flat and reference.is_flat else None
+    elements = exact or nearest
     if elements is None:
         return np.ones(len(P_m))
     areas = _nearest_areas(P_m, nearest or elements)
-    # The midpoints of the edges of triangles integrate quadratic functions exactly.
-    places = (elements.corners + np.roll(elements.corners, 1, axis=1)).reshape(-1, 3) / 2
-    if moving.surfaces:
-        places, _ = moving.projections(places)
-    shares = np.repeat(elements.areas / 3, 3)
+    places, shares = _region(elements, moving)
+    shares = shares / shares.sum() * len(P_m)
     centre = shares @ places / shares.sum()
     size = np.sqrt(shares @ ((places - centre) ** 2).sum(axis=1) / shares.sum())
     of_points, of_places = (_quadratics((positions - centre) / size) for positions in (P_m, places))
@@ -82,51 +117,43 @@ def _with_moments(areas: np.ndarray, functions: np.ndarray, moments: np.ndarray)
 
 
 class _Elements(NamedTuple):
-    """Triangles of a face: corners (element, 3, 3), areas (element,) whose mean per contact point is 1, and their size [mm]."""
+    """Triangles of a face: corners (element, 3, 3), the areas (element,) [mm^2] that count, and their size [mm]."""
 
     corners: np.ndarray
     areas: np.ndarray
     size: float
 
 
-def _elements(
-    P_m: np.ndarray,
-    distance: float,
-    moving: Surface,
-    reference: Surface,
-    region: np.ndarray | None = None,
-    *,
-    is_fine: bool = True,
-) -> _Elements | None:
-    """Return the elements of the part of the moving face that counts; None if there are none.
+def _exact_elements(face: Surface, target: Surface, within: float) -> _Elements | None:
+    """Return the triangles that are opposite to a target; None if there are none, or too many."""
+    region = opposite(face, target, within)
+    if region is None or not len(region.triangles):
+        return None
+    return _Elements(region.triangles, triangles.area(region.triangles) * region.cosines, 0.0)
 
-    region    triangles (triangle, 3, 3) of the face over the reference face; without them each element is over it or not
-    is_fine   whether elements are also small where a whole region counts
+
+def _elements(count: int, distance: float, face: Surface, target: Surface, *, by_cosines: bool = False) -> _Elements | None:
+    """Return small elements of a face, for a number of points, over a target up to a distance [mm]; None if there are none.
+
+    If `by_cosines`, their areas count by the cosine of the angle between both faces.
     """
-    size = max(moving.mesh.area / min(ELEMENTS_PER_POINT * len(P_m), MAX_ELEMENTS), 0.0) ** 0.5
-    vertices, faces = moving.vertices, moving.faces
-    if region is not None:
-        vertices, faces = region.reshape(-1, 3), np.arange(3 * len(region)).reshape(-1, 3)
-    if not len(faces):
-        return None
+    size = max(face.mesh.area / min(ELEMENTS_PER_POINT * count, MAX_ELEMENTS), 0.0) ** 0.5
+    vertices, faces, _ = face_frame(face.mesh).subdivided(face.vertices, face.faces, EDGE * size)
     corners = vertices[faces]
-    if is_fine or not _is_within(corners.reshape(-1, 3), reference, distance + size):
-        vertices, faces, _ = face_frame(moving.mesh).subdivided(vertices, faces, EDGE * size)
-        corners = vertices[faces]
-        middles = corners.mean(axis=1)
-        feet, is_over = reference.projections(middles)
-        corners = corners[(is_over | (region is not None)) & (np.linalg.norm(middles - feet, axis=1) <= distance + size)]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    if not areas.sum() > 0:
-        return None
-    return _Elements(corners, areas / areas.sum() * len(P_m), size)
+    middles = corners.mean(axis=1)
+    feet, normals, is_over = target.project(middles)
+    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    areas = np.maximum(-(crossed * normals).sum(axis=1), 0.0) if by_cosines else np.linalg.norm(crossed, axis=1)
+    counts = is_over & (np.linalg.norm(middles - feet, axis=1) <= distance + size) & (areas > 0)
+    return _Elements(corners[counts], areas[counts], size) if counts.any() else None
 
 
-def _is_within(points: np.ndarray, reference: Surface, distance: float) -> bool:
-    """Return whether the convex hull of points (point, 3) over a flat reference face is within a distance [mm] of it."""
-    n = reference.corner_normals.reshape(-1, 3).mean(axis=0)
-    heights, levels = points @ n, reference.vertices @ n
-    return bool(max(heights.max() - levels.min(), levels.max() - heights.min()) <= distance * np.linalg.norm(n))
+def _region(elements: _Elements, face: Surface) -> CountedRegion:
+    # The midpoints of the edges of triangles integrate quadratic functions exactly.
+    places = (elements.corners + np.roll(elements.corners, 1, axis=1)).reshape(-1, 3) / 2
+    if face.surfaces:
+        places, _ = face.projections(places)
+    return CountedRegion(places, np.repeat(elements.areas / 3, 3))
 
 
 def _nearest_areas(P_m: np.ndarray, elements: _Elements) -> np.ndarray:
@@ -134,7 +161,7 @@ def _nearest_areas(P_m: np.ndarray, elements: _Elements) -> np.ndarray:
     distances, nearest = KDTree(P_m).query(elements.corners.mean(axis=1), k=np.arange(1, min(len(P_m), NEIGHBOURS) + 1))
     # An element equally near to several points is shared, so that rounding in another frame changes nothing.
     ties = distances <= distances[:, :1] + TIE * elements.size
-    shares = ties * (elements.areas / ties.sum(axis=1))[:, None]
+    shares = ties * (elements.areas / elements.areas.sum() * len(P_m) / ties.sum(axis=1))[:, None]
     return np.bincount(nearest.ravel(), weights=shares.ravel(), minlength=len(P_m))
 
 

@@ -29,6 +29,14 @@ def moments_about(centre: np.ndarray, moments: np.ndarray, other_centre: np.ndar
     return np.concatenate([[count], first_moment + count * offset, moments[4:] + [change[i, j] for i, j in _UPPER]])
 
 
+def central_moments(centre: np.ndarray, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the centre (3,) [mm] of points with given `moments` (10,) about another one, and their mean products (3, 3)."""
+    offset, products = moments[1:4] / moments[0], np.zeros((3, 3))
+    for value, (i, j) in zip(moments[4:], _UPPER, strict=True):
+        products[i, j] = products[j, i] = value
+    return centre + offset, products / moments[0] - np.outer(offset, offset)
+
+
 def displacement_energy(moments: ca.SX, centre: Vector, start: Pose, end: Pose) -> ca.SX:
     """Return 1/2 sum |x_end - x_start|^2 [mm^2] over the points with the given `moments` (10, 1); it is quadratic in `end`.
 

@@ -10,6 +10,7 @@ from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.mechanics.correction import Mobility
 from tolcontact.mechanics.displacement import moment_table
 from tolcontact.mechanics.pose import Number, Vector
+from tolcontact.method import Method
 
 BALL_SHARE = 0.01  # of the group's length: radius of the ball that a point represents
 
@@ -18,18 +19,30 @@ BALL_SHARE = 0.01  # of the group's length: radius of the ball that a point repr
 class Side:
     """One side of a pair whose points can be displaced: its points, and the position of their part in the group.
 
+    is_moving     whether it is the moving side
     radii         (point,) [mm]: of the spheres that the points represent (see ContactPoints.counted)
     centre        (3,) [mm]: nominal reference point of the moments
+    face_moments  (10,): the moments of the part of the face that is opposite to the other one, if there is one: all points
+                  together count as this part, however many they are
+    density       points per area [1/mm^2] of the faces that count in the group, by which their areas are multiplied
     all_moments   (10,): the moments of all points as small balls, so that points on a line constrain all rotations, too
     """
 
     pair: int
     part: int
+    is_moving: bool
     points: np.ndarray
     radii: np.ndarray
     weights: np.ndarray
     centre: Vector
+    face_moments: np.ndarray | None
+    density: float
     all_moments: Vector
+
+    @property
+    def moments(self) -> np.ndarray:
+        """The moments (10,) of all points that an objective counts."""
+        return self.table.sum(axis=1) if self.face_moments is None else self.face_moments
 
     @property
     def table(self) -> np.ndarray:
@@ -125,10 +138,11 @@ def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
     ]
 
 
-def contact_groups(nominal: Nominal, *, weighs_areas: bool) -> list[Group]:
+def contact_groups(nominal: Nominal, method: Method) -> list[Group]:
     """Return the groups of parts that contact couples. Parts that share only a fixed neighbour are in different groups.
 
-    If `weighs_areas`, contact points are weighted by the areas that they represent; in the paper each counts once.
+    In the exact resolution contact points are weighted by the areas that they represent, and all points of a pair together
+    count as its faces do, by their areas; in the paper each point counts once.
     """
     chains = [part.movers for part in nominal.parts]
     clusters: list[set[int]] = []
@@ -138,14 +152,14 @@ def contact_groups(nominal: Nominal, *, weighs_areas: bool) -> list[Group]:
             clusters.remove(cluster)
             joined |= cluster
         clusters.append(joined)
-    return [_group(nominal, chains, tuple(sorted(cluster)), weighs_areas) for cluster in clusters]
+    return [_group(nominal, chains, tuple(sorted(cluster)), method) for cluster in clusters]
 
 
 def _movers_of(part: int | None, chains: Sequence[tuple[int, ...]]) -> set[int]:
     return set() if part is None else set(chains[part])
 
 
-def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int, ...], weighs_areas: bool) -> Group:
+def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int, ...], method: Method) -> Group:
     members = [
         (index, pair)
         for index, pair in enumerate(nominal.pairs)
@@ -167,8 +181,9 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
     spread = float(np.sqrt(((moving_points - moving_points.mean(axis=0)) ** 2).sum(axis=1).mean()))
     length = spread or float(nominal.parts[members[0][1].moving].mesh.scale)
     ball = BALL_SHARE * length
+    density = _points_per_area([pair for _, pair in members]) if method.counts_faces else 1.0
     sides = [
-        _side(position, pair, parts.index(part), of_moving, weighs_areas, centre[part], ball)
+        _side(position, pair, parts.index(part), of_moving, method, density, centre[part], ball)
         for position, (_, pair) in enumerate(members)
         for part, of_moving in ((pair.moving, True), (pair.reference, False))
         if part is not None and chains[part]
@@ -224,12 +239,42 @@ def _points_near(
     return points[part] or points[mover] or [P for other in points if chains[other] == chains[mover] for P in points[other]]
 
 
+def _area(pair: ContactPoints) -> float:
+    """Return the area [mm^2] of the moving face that counts; 0 without faces, or if no part is opposite to the other face."""
+    return 0.0 if pair.regions[0] is None else pair.regions[0].area
+
+
+def _points_per_area(pairs: Sequence[ContactPoints]) -> float:
+    """Return the number of contact points per area [1/mm^2] of the faces that count, in all pairs that have such faces.
+
+    The product of this density and an area is about a number of points, so that a point of a pair without such faces counts as
+    a point of the others. It is 1 if no pair has them.
+    """
+    counted = [(len(pair.P_m), _area(pair)) for pair in pairs if _area(pair) > 0]
+    return sum(count for count, _ in counted) / sum(area for _, area in counted) if counted else 1.0
+
+
 def _side(
-    position: int, pair: ContactPoints, part: int, of_moving: bool, weighs_areas: bool, centre: np.ndarray, radius: float
+    position: int,
+    pair: ContactPoints,
+    part: int,
+    of_moving: bool,
+    method: Method,
+    density: float,
+    centre: np.ndarray,
+    radius: float,
 ) -> Side:
-    """Return one side of a pair; in the regularization its contact points are balls of a radius [mm]."""
+    """Return one side of a pair; in the regularization its contact points are balls of a radius [mm].
+
+    density   contact points of the group per area [1/mm^2] of the faces that count
+    """
     counted, points = pair.counted(of_moving=of_moving), pair.P_m if of_moving else pair.P_r
-    weights = pair.weights if weighs_areas else np.ones(len(points))
-    all_moments = (moment_table(points, centre) * weights).sum(axis=1)
-    all_moments[[4, 7, 9]] += weights.sum() * radius**2
-    return Side(position, part, *counted, weights, centre, all_moments)
+    weights, face_moments = pair.weights if method.is_exact else np.ones(len(points)), None
+    if method.counts_faces and _area(pair) > 0:
+        weights = weights * (_area(pair) * density / len(points))
+        region = pair.regions[0 if of_moving else 1]
+        if region is not None and pair.round is None:
+            face_moments = moment_table(region.places, centre) @ region.shares * density
+    all_moments = (moment_table(points, centre) * weights).sum(axis=1) if face_moments is None else face_moments.copy()
+    all_moments[[4, 7, 9]] += all_moments[0] * radius**2
+    return Side(position, part, of_moving, *counted, weights, centre, face_moments, density, all_moments)

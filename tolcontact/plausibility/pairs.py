@@ -8,6 +8,7 @@ import numpy as np
 from tolcontact.declaration import ContactPair, Face, Inside, Part
 from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.geometry.curvature import CHORD_SHARE
+from tolcontact.mechanics.displacement import central_moments, moments_about
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
 from tolcontact.statics import balances, drawn_contacts
 
@@ -108,10 +109,11 @@ def unconstrained_rotations(draws: TrialDraws) -> Iterator[str]:
             moved = [side for side in group.sides if mover in group.mobilities[side.part].movers[-1:]]
             if all(pairs[group.pairs[side.pair]].round for side in moved):
                 continue
-            points = np.concatenate([side.spread_points for side in moved])
+            origin = np.asarray(moved[0].centre)
+            moments = np.sum([moments_about(origin, side.moments, np.asarray(side.centre)) for side in moved], axis=0)
             size = max(parts[number].mesh.scale for number in {index, *(group.parts[side.part] for side in moved)})
-            extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-            arm = float(np.linalg.norm(extents[1:])) / np.sqrt(len(points))
+            squares = np.linalg.eigvalsh(central_moments(origin, moments)[1])
+            arm = float(np.sqrt(max(squares[:-1].sum(), 0.0)))
             if arm < MIN_ARM * size:
                 yield (
                     f"{parts[index].part.designation}: its contact points lie close to a line ({arm:.2g} mm away, root mean "

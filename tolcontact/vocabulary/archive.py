@@ -184,6 +184,18 @@ PLANE_ERROR = variable(
     "mm",
 )
 
+SIDE = "side"
+SIDE_LABEL = label(SIDE, "side of a pair")
+SIDES = ("moving", "reference")
+OBJECTIVE_AREA = variable(
+    "f8 objective_area(pair, side)", "area of the part of a face that the objective counts; 0: its part is fixed", "mm2"
+)
+OBJECTIVE_CENTRE = variable("f8 objective_centre(pair, side, axis)", "centre of this part of the face, nominal", "mm")
+OBJECTIVE_MOMENT = variable(
+    "f8 objective_moment(pair, side, axis, body_axis)", "mean product of coordinates over this part, about its centre", "mm2"
+)
+OBJECTIVE = (SIDE_LABEL, OBJECTIVE_AREA, OBJECTIVE_CENTRE, OBJECTIVE_MOMENT)
+
 COMPONENT_LABEL = label(COMPONENT, "component of the displacement")
 FIELD_VERTICES = variable("f8 vertices(vertex, axis)", "surface points of the part, nominal", "mm")
 FIELD_FACES = MESH_FACES

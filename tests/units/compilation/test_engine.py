@@ -42,7 +42,7 @@ EXACT = tc.Method(resolution="exact", objective="locator stiffness")
 )
 def test_compiled_functions_equal_interpreted_ones_to_the_last_bit(name, method):
     nominal = discretize(PLANAR[name]())
-    for group in contact_groups(nominal, weighs_areas=method.is_exact):
+    for group in contact_groups(nominal, method):
         gaps = [gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs]
         qp = contact_qp.contact_qp(nominal, group, gaps, method)
         for function in (qp.assemble, qp.finish):

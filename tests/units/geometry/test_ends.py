@@ -33,6 +33,30 @@ def test_bodies_touch_exactly_if_a_place_has_a_gap_below_0(seed):
     assert np.array_equal(gaps[clear] < 0, distances[clear] < 0)
 
 
+@pytest.mark.parametrize("seed", [*range(4), *nightly(*range(4, 12))])
+def test_flat_faces_with_many_corners_touch_exactly_if_a_place_has_a_gap_below_0(seed):
+    """Corners and edges of facing planes are sorted, so that most are not looked at."""
+    rng = np.random.default_rng(seed)
+    outlines = [rng.normal(size=(40, 2)) * 8 + rng.uniform(-6, 6, 2) for _ in range(2)]
+    moving, reference = (
+        np.array([(x, y, z) for x, y in outline for z in sorted((0.0, end))])
+        for outline, end in zip(outlines, (5.0, -5.0), strict=True)
+    )
+    bodies = [trimesh.convex.convex_hull(points) for points in (moving, reference)]
+    reach = Reach(travel=1.0, tilt=0.1, spread=0.5, overlap=0.0, clearance=0.5)
+    places = meeting(tuple(Surface(body) for body in bodies), tuple(bodies), reach)
+    convex = Convex(moving), Convex(reference)
+    turns = Rotation.from_rotvec(rng.normal(size=(150, 3)) * [0.01, 0.01, 0.02]).as_matrix()
+    shifts = np.column_stack([rng.uniform(-0.3, 0.3, (150, 2)), rng.uniform(-0.1, 0.3, 150)])
+    distances = np.array([separation(*convex, R, t) for R, t in zip(turns, shifts, strict=True)])
+    gaps = places.at(np.concatenate([turns.reshape(-1, 9), shifts], axis=1)).gaps.min(axis=1, initial=np.inf)
+    clear = np.abs(distances) > 1e-9
+    assert 20 < (distances < 0).sum() < 130
+    assert np.array_equal(gaps[clear] < 0, distances[clear] < 0)
+    near = clear & (distances < 0) & (distances > -0.05)
+    assert gaps[near] == pytest.approx(distances[near], rel=0.05)
+
+
 @pytest.mark.parametrize("moves_bar", [True, False])
 @pytest.mark.parametrize("tilt", [0.02, -0.02])
 def test_a_bar_longer_than_a_corner_is_deepest_at_the_ends_of_the_corner(tilt, moves_bar):

@@ -111,6 +111,13 @@ def test_sizes_change_the_room_of_a_pin():
     assert pair.are_apart(X, deviations).tolist() == [True, False, True, False]
 
 
+def test_a_hole_that_shrinks_leaves_no_room_for_a_pin_that_hardly_moves():
+    pair = Neighbours(pin(), plate(0.0, varies=True), INSETS, 1.0)
+    X = np.tile(np.r_[np.eye(3).ravel(), 0.02, 0, 0], (2, 1))
+    left = RADIUS - PIN - 0.02 + sum(INSETS)
+    assert pair.are_apart(X, np.array([[-1.99 * left, 0], [-2.01 * left, 0]])).tolist() == [True, False]
+
+
 def test_the_bottom_of_a_hole_is_a_half_space():
     cup = tube(stadium(RADIUS, 0), stadium(RADIUS + 6, 0), 0, HEIGHT)
     bottom = trimesh.creation.box(bounds=[[-9, -9, -3], [9, 9, -0.001]])
