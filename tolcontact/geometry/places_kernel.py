@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
+from tolcontact.geometry.choice_kernel import choose, is_near, keep_shallowest, least
 from tolcontact.geometry.kernel import (
     CORNER_ON_FACET,
     EDGE_ON_EDGE,
@@ -85,29 +86,6 @@ def cover(poses, corners, travel, turn, covered):  # type: ignore[no-untyped-def
                 covered[k] = False
 
 
-@uncounted
-def _keep_shallowest(candidates, touching, gaps, least):  # type: ignore[no-untyped-def]
-    """Drop all but the nearest facet of a corner that is behind several: it leaves through that one. Facing planes are kept.
-
-    A corner may be behind several facets by no more than `least` [mm].
-    """
-    best, owner_of_best = -1, -1
-    for s in touching:
-        kind = candidates.kinds[s]
-        if kind == EDGE_ON_EDGE or not gaps[s] < -least:
-            continue
-        owner = 2 * candidates.firsts[s] if kind == CORNER_ON_FACET else 2 * candidates.seconds[s] + 1
-        if owner != owner_of_best:
-            best, owner_of_best = s, owner
-        elif gaps[s] <= gaps[best]:
-            if candidates.planes[s] < 0 and gaps[s] < gaps[best]:
-                gaps[s] = np.inf
-        else:
-            if candidates.planes[best] < 0:
-                gaps[best] = np.inf
-            best = s
-
-
 @inlined_uncounted
 def _is_over_plane(candidates, plane, body, x, slack):  # type: ignore[no-untyped-def]
     """Return whether x, in the frame of a body (0: moving, 1: reference), lies over one of two facing planes."""
@@ -144,17 +122,6 @@ def _write(results, s, gaps, points, projections, normals):  # type: ignore[no-u
     gaps[s] = results[0]
     for vectors, vector in ((points, results[1]), (projections, results[2]), (normals, results[3])):
         vectors[s, 0], vectors[s, 1], vectors[s, 2] = vector
-
-
-@uncounted
-def _is_near(candidates, s, projection, projections, touching, gaps, distance):  # type: ignore[no-untyped-def]
-    """Return whether a contact point of facing planes is within `distance` of another one at which they touch."""
-    for neighbour in touching:
-        if candidates.planes[neighbour] == candidates.planes[s] and gaps[neighbour] < np.inf:
-            difference = minus(row(projections, neighbour), projection)
-            if dot(difference, difference) <= distance * distance:
-                return True
-    return False
 
 
 @inlined_uncounted
@@ -205,9 +172,9 @@ def _motion(ball, X):  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _find_at(
+def _find_at(  # type: ignore[no-untyped-def]
     A, B, candidates, reach, margins, nearness, overhang, retained, ceiling, X, moved, touching, is_held, gaps, all_points
-):  # type: ignore[no-untyped-def]
+):
     """Write gap, points and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
     Retained candidates of facing planes count slightly outside their edges: near a corner of the overlap the error of the
@@ -244,52 +211,18 @@ def _find_at(
                     touching[count], count = s, count + 1
             s += 1
     drop_passed(A, B, candidates, reach[2], X, touching[:count], gaps, all_points, is_held)
-    _keep_shallowest(candidates, touching[:count], gaps, max(INSIDE, overhang))
+    keep_shallowest(candidates, touching[:count], gaps, max(INSIDE, overhang))
     strict = count
     for s in retained:
         if s >= 0 and candidates.planes[s] >= 0 and gaps[s] == np.inf:
             slack = margins[candidates.planes[s]]
             results = _place(A, B, candidates, s, slack, reach, X, moved)
-            if results[0] < np.inf and _is_near(
+            if results[0] < np.inf and is_near(
                 candidates, s, results[2], projections, touching[:strict], gaps, nearness * slack
             ):
                 _write(results, s, gaps, points, projections, normals)
                 touching[count], count = s, count + 1
     return count
-
-
-@uncounted
-def _choose(touching, gaps, projections, retained, directions, is_chosen, labels):  # type: ignore[no-untyped-def]
-    """Write the labels (p,) of relevant points: retained ones, those with the smallest gaps, and the outermost; -1 for none.
-
-    Return the number of points.
-    """
-    number, count = 0, labels.size - (directions.shape[0] if touching.size > labels.size else 0)
-    for s in touching:
-        is_chosen[s] = gaps[s] == np.inf
-    for s in retained:
-        if s >= 0 and gaps[s] < np.inf and not is_chosen[s]:
-            labels[number], is_chosen[s], number = s, True, number + 1
-    while number < count:
-        shallowest, gap = -1, np.inf
-        for s in touching:
-            if gaps[s] < gap and not is_chosen[s]:
-                shallowest, gap = s, gaps[s]
-        if shallowest < 0:
-            labels[number:] = -1
-            return number
-        labels[number], is_chosen[shallowest], number = shallowest, True, number + 1
-    for direction in directions:
-        outermost, farthest = -1, -np.inf
-        for s in touching:
-            if gaps[s] < np.inf:
-                distance = dot(direction, row(projections, s))
-                if distance > farthest:
-                    outermost, farthest = s, distance
-        if outermost >= 0 and not is_chosen[outermost]:
-            labels[number], is_chosen[outermost], number = outermost, True, number + 1
-    labels[number:] = -1
-    return number
 
 
 @uncounted
@@ -306,15 +239,6 @@ def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-unty
     for j in range(facing.shape[0]):
         across = cross(turn(X, row(A.normals, facing[j, 0])), row(B.normals, facing[j, 1]))
         sines[j] = math.sqrt(dot(across, across))
-
-
-@uncounted
-def _least(touching, gaps):  # type: ignore[no-untyped-def]
-    """Return the smallest gap of candidates that touch; infinite if there are none."""
-    least = np.inf
-    for s in touching:
-        least = min(least, gaps[s])
-    return least
 
 
 @uncounted
@@ -340,10 +264,10 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, ceili
                 A, B, candidates, reach, margins, error[2], error[3], retained[k], ceiling, X, moved, touching, is_held,
                 all_gaps, all_points,
             )  # fmt: skip
-            if ceiling == np.inf or _least(touching[:number], all_gaps) <= ceiling:
+            if ceiling == np.inf or least(touching[:number], all_gaps) <= ceiling:
                 break
             ceiling = np.inf
-        chosen = _choose(touching[:number], all_gaps, projections_at, retained[k], directions, is_chosen, labels[k])
+        chosen = choose(touching[:number], all_gaps, projections_at, retained[k], directions, is_chosen, labels[k])
         largest = max(largest, chosen)
         gaps[k, chosen:] = np.inf
         for p in range(chosen):
@@ -361,9 +285,9 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, ceili
 
 
 @compiled
-def find(
+def find(  # type: ignore[no-untyped-def]
     A, B, candidates, reach, margin, error, poses, retained, ceilings, directions, labels, gaps, points, projections, normals
-):  # type: ignore[no-untyped-def]
+):
     """Write the relevant points at which bodies can touch, at poses X_RM (n, 12), and return the largest number of points.
 
     First come the candidates in `retained` (n, k), then those with the smallest gaps, then the outermost in each of the
