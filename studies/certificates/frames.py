@@ -143,7 +143,8 @@ def main() -> int:
     cases, differing = SCENES | AT_NIGHT | models, 0
     for name in options.names or cases:
         try:
-            original = Original(cases[name][0](), cases[name][1])
+            declare, solver = cases[name]
+            original = Original(declare(), solver)
             for change, (difference, is_equal) in comparisons(original):
                 is_same = is_equal and difference < LIMIT
                 differing += not is_same

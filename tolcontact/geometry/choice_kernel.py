@@ -31,6 +31,27 @@ def keep_shallowest(candidates, touching, gaps, least):  # type: ignore[no-untyp
 
 
 @uncounted
+def drop_beyond_ridges(candidates, touching, gaps, tie):  # type: ignore[no-untyped-def]
+    """Drop a facet that a corner touches, with a gap of at most `tie` [mm], if it touches a facing plane beyond a convex edge.
+
+    A corner is outside if it is in front of one of the two: held in front of both, it could not leave along either.
+    """
+    first, owner_of_first = 0, -1
+    for k in range(touching.size):
+        s = touching[k]
+        kind = candidates.kinds[s]
+        if kind == EDGE_ON_EDGE:
+            return
+        owner = 2 * candidates.firsts[s] if kind == CORNER_ON_FACET else 2 * candidates.seconds[s] + 1
+        if owner != owner_of_first:
+            first, owner_of_first = k, owner
+        if candidates.planes[s] >= 0 and -tie <= gaps[s] <= tie:
+            for other in touching[first:k]:
+                if candidates.ridges[other] == candidates.planes[s] and gaps[other] <= tie:
+                    gaps[other] = np.inf
+
+
+@uncounted
 def is_near(candidates, s, projection, projections, touching, gaps, distance):  # type: ignore[no-untyped-def]
     """Return whether a contact point of facing planes is within `distance` of another one at which they touch."""
     for neighbour in touching:

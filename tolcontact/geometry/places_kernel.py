@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
-from tolcontact.geometry.choice_kernel import choose, is_near, keep_shallowest, least
+from tolcontact.geometry.choice_kernel import choose, drop_beyond_ridges, is_near, keep_shallowest, least
 from tolcontact.geometry.kernel import (
     CORNER_ON_FACET,
     EDGE_ON_EDGE,
@@ -45,6 +45,7 @@ class Candidates(NamedTuple):
     The candidates of a corner or edge and one facing plane, or no plane, are a run; runs begin at `runs` (run + 1,). From
     `middles` (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm]. Runs
     at holes do not matter before bodies move by `clearances` (run,) [mm] from their nominal poses; this is 0 for other runs.
+    `ridges` (candidate,) are the facing planes beyond a convex edge of the facet that a corner may touch, -1 for none.
     `ball` (4,) [mm] is the centre and radius of a ball around the moving corners.
     `boxes` (candidate, 4) [mm] are the smallest and largest coordinates of the facets or the edge that a corner or an edge may
     touch in a facing plane, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (row, 4) are the outlines of
@@ -56,6 +57,7 @@ class Candidates(NamedTuple):
     firsts: np.ndarray
     seconds: np.ndarray
     planes: np.ndarray
+    ridges: np.ndarray
     facing: np.ndarray
     runs: np.ndarray
     middles: np.ndarray
@@ -211,6 +213,7 @@ def _find_at(  # type: ignore[no-untyped-def]
                     touching[count], count = s, count + 1
             s += 1
     drop_passed(A, B, candidates, reach[2], X, touching[:count], gaps, all_points, is_held)
+    drop_beyond_ridges(candidates, touching[:count], gaps, margin)
     keep_shallowest(candidates, touching[:count], gaps, max(INSIDE, overhang))
     strict = count
     for s in retained:

@@ -58,12 +58,29 @@ def sorted_candidates(
     is_edge = (kinds[leaders] == EDGE_ON_EDGE) & (planes[leaders] >= 0) & (not has_form)
     clearances = np.zeros(len(leaders))
     clearances[is_edge] = hole_clearances(A, B, facing)[firsts[leaders[is_edge]], planes[leaders[is_edge]]]
+    ridges = np.full(len(kinds), -1)
+    for kind, body, facets, of_planes in (
+        (CORNER_ON_FACET, B, seconds, facing[:, 1]),
+        (FACET_ON_CORNER, A, firsts, facing[:, 0]),
+    ):
+        rows = np.flatnonzero((kinds == kind) & (planes < 0))
+        ridges[rows] = _planes_beyond(body, body.facet_planes[of_planes])[body.facet_planes[facets[rows]]]
     centre = A.vertices.mean(axis=0)
     ball = np.append(centre, np.linalg.norm(A.vertices - centre, axis=1).max())
     return Candidates(
-        kinds, firsts, seconds, planes, facing, *by_owner[1:], CLEARANCE_SHARE * clearances, ball,
+        kinds, firsts, seconds, planes, ridges, facing, *by_owner[1:], CLEARANCE_SHARE * clearances, ball,
         boxes[by_owner.order], frames, *_in_bands(outlines),
     )  # fmt: skip
+
+
+def _planes_beyond(body: Polyhedron, planes: Int[Array, " p"]) -> Int[Array, " _"]:
+    """Return for each plane of a body the index in `planes` of one beyond a convex edge, -1 for none."""
+    beyond = np.full(int(max(body.facet_planes.max(initial=0), body.edge_planes.max(initial=0))) + 1, -1)
+    ends = body.edge_planes[body.convex.astype(bool) & (body.edge_planes >= 0).all(axis=1)]
+    for sides in (ends, ends[:, ::-1]):
+        for k, plane in enumerate(planes):
+            beyond[sides[sides[:, 0] == plane, 1]] = k
+    return beyond
 
 
 def _in_bands(outlines: list[Float[Array, "segment 2 2"]]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
