@@ -5,7 +5,7 @@ import pytest
 
 import tolcontact as tc
 from studies.certificates import optima
-from studies.certificates.optima import ALL, Search, case_scene, compared, counted, ends_scene, judged
+from studies.certificates.optima import ALL, Search, case_scene, compared, counted, ends_scene, judged, placed_scene
 from tests.cases.ends import case
 from tests.helpers import nightly
 
@@ -25,6 +25,16 @@ TOUCHED = ("needles, tilted", "chamfered pads", "cone", "steep cone", "cone abov
 @pytest.mark.parametrize("name", ["steep cone", *nightly(*(name for name in TOUCHED if name != "steep cone"))])
 def test_nor_where_faces_end_within_reach(name):
     assert_best(judged(case_scene(*case(name)), samples=8, seed=1, starts=1))
+
+
+# The rim of a face crosses another one; a corner lies on a convex edge of a whole body.
+CORNERS_ON_EDGES = [(92006, 1), *nightly((92003, 1), (92199, 3), (92230, 3))]
+
+
+@pytest.mark.parametrize(("seed", "samples"), CORNERS_ON_EDGES)
+def test_nor_where_corners_lie_on_edges(seed, samples):
+    rows = judged(placed_scene(seed, ALL), samples=samples, seed=seed, starts=0)
+    assert {row["kind"] for row in rows} == {"none better"}
 
 
 def test_a_pose_that_is_lifted_too_far_is_found_out():
