@@ -7,6 +7,8 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests.cases import elastic as cases
 from tests.helpers import compiled, nightly
+from tolcontact.mechanics.flexibility import elastic_bodies
+from tolcontact.plausibility.elastic_checks import LAWS, loaded_parts
 from tolcontact.report import write_page
 from tolcontact.simulation import simulate_block
 from tolcontact.vocabulary import CORRECTED, Status
@@ -176,6 +178,27 @@ def test_a_heavy_beam_on_three_supports_rests_mostly_on_the_middle_one(tmp_path)
     loads = loads_of(program, block, "supports of beam")[0]
     assert loads.sum() == pytest.approx(weight, rel=1e-6)
     assert loads[2:4].sum() / weight == pytest.approx(0.62325, rel=1e-3)
+
+
+@pytest.mark.parametrize("place", [{}, {"rotation": (0, 0, np.pi / 2), "at": (500, -80, 33)}])
+def test_the_weight_of_a_tilted_part_acts_at_its_centre_of_mass(place):
+    """Feet 180 mm apart below a bar of height h, tilted by t: the upper one carries 1/2 - h tan(t)/360 of the weight."""
+    pytest.importorskip("ngsolve")
+    model = tc.Assembly("tilted bar")
+    bar = model.part("bar", tc.Box(200, 20, 30), **place)
+    bar.elastic(E=210e3, nu=0.3, density=7850)
+    model.gravity((0, 0, -9.81))
+    feet = [tc.Locator(f"A{k}", point, "z", one_sided=True) for k, point in enumerate([(10, 3, 0), (10, 17, 0), (190, 10, 0)])]
+    sides = [tc.Locator("B1", (10, 0, 15), "y"), tc.Locator("B2", (190, 0, 15), "y"), tc.Locator("C", (0, 10, 15), "x")]
+    model.locate(bar, [*feet, *sides], tolerance=1)
+    model.measure("top", bar.point(100, 10, 30), along="z", tolerance=1)
+    rises = np.array([0.0, 2.0, 6.0])
+    program, block = block_of(model, {"bar.A2": rises})
+    loads, tangent = loads_of(program, block, "supports of bar"), rises / np.sqrt(180**2 - rises**2)
+    assert loads.sum(axis=1) == pytest.approx(7850e-9 * 9.81 * 200 * 20 * 30, rel=1e-9)
+    assert loads[:, 2] / loads.sum(axis=1) == pytest.approx(1 / 2 - 30 * tangent / 360, abs=1e-7)
+    (moments,) = (law for law in LAWS if law.name == "balance of moments")
+    assert max(map(moments.error, loaded_parts(program, elastic_bodies(program.nominal), block))) < 1e-9
 
 
 def test_fields_and_the_picture_of_the_page_show_bending(tmp_path):
