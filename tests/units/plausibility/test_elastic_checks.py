@@ -8,7 +8,7 @@ import pytest
 
 import tolcontact as tc
 from tests.helpers import call, compiled
-from tests.test_elastic_parts import supported_beam, tips
+from tests.test_elastic_parts import block_of, loads_of, supported_beam, tips
 from tolcontact.compilation.other_flexibility import stiffer, with_flexibility
 from tolcontact.errors import NominalWarning
 from tolcontact.mechanics.flexibility import elastic_bodies, part_flexibilities
@@ -115,6 +115,27 @@ def test_reactions_that_do_not_balance_are_named(tmp_path, fault, laws):
     fault(block.load)
     _, doubts = checked(law_remarks(loaded_parts(program, elastic_bodies(program.nominal), block)))
     assert [law for law in ("forces", "moments") if any(f"balance of {law} holds" in doubt for doubt in doubts)] == laws
+
+
+@pytest.mark.parametrize("place", [{}, {"rotation": (0, 0, np.pi / 2), "at": (500, -80, 33)}])
+def test_the_weight_of_a_tilted_part_acts_at_its_centre_of_mass(place):
+    """Feet 180 mm apart below a bar of height h, tilted by t: the upper one carries 1/2 - h tan(t)/360 of the weight."""
+    pytest.importorskip("ngsolve")
+    model = tc.Assembly("tilted bar")
+    bar = model.part("bar", tc.Box(200, 20, 30), **place)
+    bar.elastic(E=210e3, nu=0.3, density=7850)
+    model.gravity((0, 0, -9.81))
+    feet = [tc.Locator(f"A{k}", point, "z", one_sided=True) for k, point in enumerate([(10, 3, 0), (10, 17, 0), (190, 10, 0)])]
+    sides = [tc.Locator("B1", (10, 0, 15), "y"), tc.Locator("B2", (190, 0, 15), "y"), tc.Locator("C", (0, 10, 15), "x")]
+    model.locate(bar, [*feet, *sides], tolerance=1)
+    model.measure("top", bar.point(100, 10, 30), along="z", tolerance=1)
+    rises = np.array([0.0, 2.0, 6.0])
+    program, block = block_of(model, {"bar.A2": rises})
+    loads, tangent = loads_of(program, block, "supports of bar"), rises / np.sqrt(180**2 - rises**2)
+    assert loads.sum(axis=1) == pytest.approx(7850e-9 * 9.81 * 200 * 20 * 30, rel=1e-9)
+    assert loads[:, 2] / loads.sum(axis=1) == pytest.approx(1 / 2 - 30 * tangent / 360, abs=1e-7)
+    (moments,) = (law for law in LAWS if law.name == "balance of moments")
+    assert max(map(moments.error, loaded_parts(program, elastic_bodies(program.nominal), block))) < 1e-9
 
 
 def test_sound_parts_obey_all_laws_to_rounding_and_a_file_has_no_mesh(tmp_path):
