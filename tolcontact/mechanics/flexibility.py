@@ -165,7 +165,7 @@ def _source(entry: NominalPart) -> MeshSource | MatrixSource:
     R, _ = mesh.metadata.get(FROM_PRODUCT, (np.eye(3), None))
     is_mirrored = np.linalg.det(R) < 0  # which is no solid of its file
     step = geometry.source if isinstance(geometry, Mesh) and geometry.is_step and not is_mirrored else None
-    return MeshSource(mesh.vertices, mesh.faces, elastic.E, elastic.nu, elastic.density, step)
+    return MeshSource(mesh.vertices, mesh.faces, elastic.E, elastic.nu, elastic.density, step, elastic.element_size)
 
 
 def with_weights(group: Group, nominal: Nominal, bodies: Bodies) -> Group:

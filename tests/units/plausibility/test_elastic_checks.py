@@ -174,7 +174,7 @@ def test_the_uncertainty_by_the_mesh_contains_what_a_third_of_the_edges_changes(
 def test_too_coarse_a_mesh_is_doubted_and_one_too_fine_to_refine_is_left_out():
     _, (doubt,) = checked(elastic_remarks(bar(tolerance=1e-3)))
     assert 'measurement "quarter"' in doubt
-    assert "of its tolerance of elastic parts (at most 0.05 is expected); import a stiffness matrix of a finer mesh" in doubt
+    assert "of its tolerance of elastic parts (at most 0.05 is expected); give a smaller element_size, or import" in doubt
     program = bar()
     bodies = {part: replace(body, nodes=np.zeros((20_000, 3))) for part, body in elastic_bodies(program.nominal).items()}
     remarks = mesh_remarks(TrialDraws.of(program), bodies, np.zeros((1, len(program.nominal.contributors))))
