@@ -77,19 +77,23 @@ LABELS = [f"weld.{name}.L{k}" for name in cases.SHEETS for k in range(7)]
 
 
 @pytest.fixture(scope="module")
-def slopes():
+def slopes(tmp_path_factory):
     """Heights of a corner per unit deviation of each locator (station, locator), by all freedoms of both meshes.
 
     There is no contact, so stations are linear: the second one keeps the gaps of the first at the welds.
     """
-    sheets = WholeSheets()
-    placed = [sheets.at(name, sheets.place(name, x, y), n) for name in cases.SHEETS for x, y, n in cases.PLACED[name]]
-    guns = [sheets.across(x, y, "z") for x, y in cases.WELDED]
-    kept = np.array([sheets.across(x, y, axis) for x, y in cases.WELDED for axis in "xyz"])
-    free = [sheets.at(name, sheets.place(name, x, y), n) for name, x, y, n in cases.FREE]
-    clamped, _ = sheets.held(np.array([*placed, *guns]), np.eye(len(placed) + len(guns))[:, : len(placed)])
-    released, _ = sheets.held(np.array([*free, *kept]), np.concatenate([np.zeros((len(free), len(placed))), kept @ clamped]))
-    row = sheets.at("rear", sheets.place("rear", *PLACE), "z")
+    folder = tmp_path_factory.mktemp("sheets")
+    cases.welded_sheets(folder)  # which writes the matrices
+    sheets = WholeSheets(folder, linear=True)
+    placed = [sheets.at(name, sheets.place(name, x, y), n)[1] for name in cases.SHEETS for x, y, n in cases.PLACED[name]]
+    guns = [sheets.across(x, y, "z")[1] for x, y in cases.WELDED]
+    kept = np.array([sheets.across(x, y, axis)[1] for x, y in cases.WELDED for axis in "xyz"])
+    free = [sheets.at(name, sheets.place(name, x, y), n)[1] for name, x, y, n in cases.FREE]
+    rows, count = np.array([*placed, *guns, *sheets.means]), len(placed)
+    clamped, _ = sheets.held(rows, np.eye(len(rows))[:, :count])
+    targets = np.concatenate([np.zeros((len(free), count)), kept @ clamped, np.zeros((len(sheets.means), count))])
+    released, _ = sheets.held(np.array([*free, *kept, *sheets.means]), targets)
+    _, row = sheets.at("rear", sheets.place("rear", *PLACE), "z")
     return np.array([row @ clamped, row @ released])
 
 

@@ -9,7 +9,7 @@ import pytest
 import tolcontact as tc
 from tests.helpers import assembly_of, compiled
 from tests.test_elastic_parts import supported_beam, tips
-from tolcontact.errors import ModelError, OptionError
+from tolcontact.errors import ArchiveError, ModelError, OptionError
 
 
 def plain(**elastic):
@@ -33,6 +33,9 @@ def plain(**elastic):
         ({"density": 2700}, "elastic needs E and nu"),
         ({"E": 70e3, "nu": 0.3, "density": -1}, "elastic density is -1; expected a density"),
         ({"E": 70e3, "nu": 0.3, "pad": 0}, "elastic pad is 0; expected a length"),
+        ({"E": 70e3, "nu": 0.3, "element_size": 0}, "elastic element_size is 0; expected a length"),
+        ({"E": 70e3, "nu": 0.3, "element_size": 60}, 'part "bar".*element_size is 60 mm, .*give at most 50 mm'),
+        ({"stiffness": "K.npz", "nodes": "n.csv", "element_size": 2}, "elastic has an element_size and a stiffness"),
         ({"stiffness": "K.npz"}, "elastic has a stiffness without nodes"),
         ({"stiffness": "K.npz", "nodes": "n.csv", "E": 1, "nu": 0}, "elastic has E or nu and a stiffness"),
         ({"stiffness": "missing.npz", "nodes": "missing.npz"}, 'part "bar".*missing.npz'),
@@ -68,7 +71,7 @@ def test_gravity_needs_an_acceleration_and_a_mass(change, fault):
 
 
 def test_documents_state_elasticity_and_those_of_rigid_models_do_not(tmp_path):
-    model = plain(E=70e3, nu=0.33, density=2700, pad=2.5)
+    model = plain(E=70e3, nu=0.33, density=2700, pad=2.5, element_size=3)
     model.gravity((0, 0, -9.81))
     rigid, elastic = tmp_path / "rigid.json", tmp_path / "elastic.json"
     tc.io.write_model(plain(), rigid)
@@ -77,10 +80,27 @@ def test_documents_state_elasticity_and_those_of_rigid_models_do_not(tmp_path):
     assert "gravity" not in rigid.read_text()
     again = assembly_of(elastic)
     read = again.parts[0].elasticity
-    assert (read.E, read.nu, read.density, read.pad) == (70e3, 0.33, 2700, 2.5)
+    assert (read.E, read.nu, read.density, read.pad, read.element_size) == (70e3, 0.33, 2700, 2.5, 3)
     assert again.acceleration == (0, 0, -9.81)
     tc.io.write_model(again, rigid)
     assert json.loads(rigid.read_text()) == json.loads(elastic.read_text())
+
+
+def test_smaller_elements_are_more_nodes_of_another_body_in_the_archive(tmp_path):
+    pytest.importorskip("ngsolve")
+    hashes, out = [], tmp_path / "run.nc"
+    for size in (None, 20.0, 10.0):
+        program = compiled(plain(E=70e3, nu=0.33, **({} if size is None else {"element_size": size})))
+        (bar,) = program.bending.parts.values()
+        with tc.run(program, samples=4, seed=1, out=out, overwrite=True) as results:
+            hashes.append((results["elastic"].elastic_hash.item(), bar.nodes))
+            assert tc.io.model_of(results).parts[0].elasticity.element_size == size
+            assert ("elements of 20 mm" in results["elastic"].elastic_source.item()) == (size == 20.0)
+    (_, usual), (_, coarse), (_, fine) = hashes
+    assert coarse < fine < usual
+    assert len({digest for digest, _ in hashes}) == 3
+    with pytest.raises(ArchiveError, match="contains another model"):
+        tc.run(compiled(plain(E=70e3, nu=0.33, element_size=20.0)), samples=8, seed=1, out=out, resume=True)
 
 
 @pytest.mark.parametrize(

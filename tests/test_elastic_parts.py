@@ -9,7 +9,7 @@ from tests.cases import elastic as cases
 from tests.helpers import compiled, nightly
 from tolcontact.report import write_page
 from tolcontact.simulation import simulate_block
-from tolcontact.vocabulary import CORRECTED, Status
+from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 L, B, H = 400.0, 20.0, 10.0
 BENDING = 210e3 * B * H**3 / 12  # E I [N mm^2]
@@ -136,6 +136,30 @@ def test_two_tips_that_guns_close_meet_where_their_forces_balance(tmp_path):
     program, block = block_of(tips(tmp_path), raised)
     assert 100 * block.measured[0, CORRECTED, :2] == pytest.approx(-0.277778, abs=1e-6)
     assert 100 * loads_of(program, block, "guns of weld.tips").sum() == pytest.approx(1.0266667, rel=2e-6)
+    later = [k for k, pair in enumerate(program.nominal.pairs) if program.nominal.parts[pair.moving].station == "check"]
+    assert np.abs(block.load[:, np.isin(program.nominal.loads[:, 0], later)]).max() < 1e-8
+
+
+def test_guns_close_faces_with_form_and_the_released_joint_has_no_load(tmp_path):
+    """Heights h of both faces at the gun are as if the tips were apart by them: (k1 d1 + k2 (d2 - h)) / (k1 + k2).
+
+    Points of the features tell the heights, before parts meet.
+    """
+    model = tips(tmp_path)
+    weld, _ = model.stations
+    for part, side, point in zip(model.parts, ("+z", "-z"), ((92, 10, 1), (8, 10, 0)), strict=True):
+        face = part.feature("lap", part.face(side), tc.Flatness(0.002))
+        weld.measure(f"{part.name} face", face.point(*point), along="z", tolerance=1)
+    program = compiled(model)
+    deviations = program.draws(seed=1, start=0, stop=20)
+    block = simulate_block(program, deviations)
+    assert (block.status == Status.RESOLVED).all()
+    left, right, left_face, right_face, _ = block.measured[:, RAW].T
+    h = left_face - left + right - right_face
+    assert np.abs(h).max() > 5e-4
+    tip, _, left_closed, right_closed, _ = block.measured[:, CORRECTED].T
+    assert left_closed == pytest.approx(right_closed, abs=1e-8)
+    assert tip == pytest.approx((1.05 * left + 8.4 * (right - h)) / 9.45, abs=1e-6)
     later = [k for k, pair in enumerate(program.nominal.pairs) if program.nominal.parts[pair.moving].station == "check"]
     assert np.abs(block.load[:, np.isin(program.nominal.loads[:, 0], later)]).max() < 1e-8
 

@@ -1,5 +1,7 @@
 """Welded sheets against a contact problem over all freedoms of their meshes; archives, blocks and threads of elastic parts."""
 
+from dataclasses import replace
+
 import netCDF4
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ import tolcontact as tc
 from tests.cases import MODELS, elastic as cases
 from tests.helpers import assembly_of, compiled, nightly
 from tolcontact.compilation import ACCURACY
-from tolcontact.errors import NominalWarning
+from tolcontact.errors import ModelError, NominalWarning
 from tolcontact.simulation import simulate_block
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 from tolcontact.vocabulary import CORRECTED, Status
@@ -23,12 +25,13 @@ MEASURED = ((150, 100), (550, 200), (400, 0))
 class WholeSheets:
     """The sheets with all freedoms of their meshes, about poses whose rotations are finite or, as a `linear` model, nominal.
 
-    Unknowns are the displacements of all nodes, which have no mean rigid motion at the nodes of the matrices in a folder, and
-    the increments (translation, rotation) of both poses.
+    Forms raise the faces of the flanges: `raised` has the sum of both heights by place (x, y). Unknowns are the displacements
+    of all nodes, which have no mean rigid motion at the nodes of the matrices in a folder, and the increments (translation,
+    rotation) of both poses.
     """
 
-    def __init__(self, folder, *, linear=False):
-        self.linear = linear
+    def __init__(self, folder, *, linear=False, raised=None):
+        self.linear, self.raised = linear, raised or {}
         meshes = {name: cases.sheet_mesh(thickness) for name, (_, thickness) in cases.SHEETS.items()}
         self.nodes = {name: nodes + np.array([cases.SHEETS[name][0], 0, name == "rear"]) for name, (nodes, _) in meshes.items()}
         sizes = [len(K) for _, K in meshes.values()]
@@ -62,14 +65,14 @@ class WholeSheets:
         return n @ (x - point), row
 
     def across(self, x, y, direction):
-        """The opening between the flanges, along a normal that rotates with the front sheet, and its row (unknown,)."""
+        """The opening between the flanges, with form, along a normal that rotates with the front sheet, and its row."""
         point, n = np.array([x, y, 1.0]), np.eye(3)["xyz".index(direction[-1])]
         (R, t), (R_r, t_r) = self.poses["rear"], self.poses["front"]
         x_m, normal = R @ point + t, R_r @ n
         row = self.shift("rear", point, n) - self.shift("front", point, n)
         slopes = np.array([*normal, *np.cross(x_m, normal)])
         row[self.size :] = [*-slopes, *slopes]
-        return n @ (R_r.T @ (x_m - t_r) - point), row
+        return n @ (R_r.T @ (x_m - t_r) - point) - self.raised.get((x, y), 0.0) * n[2], row
 
     def solved(self, conditions, targets, contact, size):
         """Unknowns of least energy where conditions (value, row) meet targets, and flanges do not penetrate each other."""
@@ -102,7 +105,7 @@ class WholeSheets:
             cones = [clarabel.ZeroConeT(len(targets)), clarabel.NonnegativeConeT(len(gaps))]
             problem = sp.triu(self.K / 1e3).tocsc(), np.zeros(self.K.shape[0]), A, b, cones, settings
             pushes = np.array(clarabel.DefaultSolver(*problem).solve().z)[len(targets) :]
-            touching = pushes > 1e-3 * pushes.max(initial=0)
+            touching = (pushes > 1e-3 * pushes.max(initial=0)) & gaps.any(axis=1)
         for _ in range(10):
             x, multipliers = self.held(np.vstack([equations, gaps[touching]]), np.concatenate([targets, least[touching]]))
             self.forces = np.zeros(len(gaps))
@@ -163,25 +166,90 @@ def flange_forces(program, block):
     return block.load[:, columns]
 
 
+def with_form(model, flatness):
+    """The model with form on both faces of the flange."""
+    for part, side in zip(model.parts, ("+z", "-z"), strict=True):
+        part.feature("flange", part.face(side), tc.Flatness(flatness))
+    return model
+
+
+def raised_places(program, deviations):
+    """The sums of the heights of both forms by place (x, y) of the flange, for deviations (contributor,)."""
+    points = np.array([(x, y, 1.0) for x, y in cases.FLANGE])
+    heights = sum(face.form.heights(points) @ deviations[face.form_columns] for face in program.nominal.faces)
+    return dict(zip(cases.FLANGE, heights, strict=True)) if program.nominal.faces else {}
+
+
 @pytest.mark.parametrize(
-    ("contact", "tolerance", "count"), [(True, 0.05, 1), *nightly((True, 0.05, 20), (True, 0.005, 20), (False, 0.05, 5))]
+    ("contact", "tolerance", "flatness", "count"),
+    [
+        (True, 0.05, 0, 1),
+        (True, 0.05, 0.1, 1),
+        *nightly((True, 0.05, 0, 20), (True, 0.005, 0, 20), (False, 0.05, 0, 5), (True, 0.05, 0.1, 5), (False, 0.05, 0.1, 5)),
+    ],
 )
-def test_welded_sheets_spring_back_as_their_whole_meshes_do(tmp_path, contact, tolerance, count):
+def test_welded_sheets_spring_back_as_their_whole_meshes_do(tmp_path, contact, tolerance, flatness, count):
     """A linear model, without finite rotations, differs by their squares: by 1e-4 mm, and a hundredth at a tenth."""
-    program = compiled(cases.welded_sheets(tmp_path, tolerance=tolerance, contact=contact, measured=MEASURED))
+    model = cases.welded_sheets(tmp_path, tolerance=tolerance, contact=contact, measured=MEASURED)
+    program = compiled(with_form(model, flatness) if flatness else model)
     deviations = program.draws(seed=1, start=0, stop=count)
     block = simulate_block(program, deviations)
     assert (block.status == Status.RESOLVED).all()
     forces = flange_forces(program, block) if contact else 0
-    for linear in (False, True) if count > 1 else (False,):
-        sheets, within = WholeSheets(tmp_path, linear=linear), 0.04 * tolerance**2 if linear else 1e-7
-        expected, loads = zip(*((sheets.built(row[:14], contact), np.array(sheets.loads)) for row in deviations), strict=True)
-        error = np.abs(block.measured[:, CORRECTED] - expected).max()
+    for linear in (False, True) if count > 1 and not flatness else (False,):
+        expected, loads = [], []
+        for row in deviations:
+            sheets = WholeSheets(tmp_path, linear=linear, raised=raised_places(program, row))
+            expected.append(sheets.built(row[:14], contact))
+            loads.append(np.array(sheets.loads))
+        error, within = np.abs(block.measured[:, CORRECTED] - expected).max(), 0.04 * tolerance**2 if linear else 1e-7
         assert np.abs(np.array(expected)[:, 3:]).max() > tolerance / 20  # they spring back
         assert error < within
         if contact and not linear:
             assert forces == pytest.approx(np.array(loads), abs=1e-6 * np.max(loads))
             assert (np.max(loads, axis=2) > 0).all()
+
+
+def with_contact(model, roles):
+    """The model with contact of the flanges: `roles` are the numbers of the moving and the reference part."""
+    for station in model.stations:
+        moving, reference = (model.parts[k].face(("+z", "-z")[k]) for k in roles)
+        station.contact(f"flange in {station.name}", moving=moving, reference=reference, within=0.5)
+    return model
+
+
+@pytest.mark.parametrize("flatness", [0, 0.01])
+def test_flanges_have_one_answer_whichever_moves_and_guns_hold_where_they_are(tmp_path, flatness):
+    """Normals of either face differ by the rotations of sheets: answers by their squares, and rows of one point contradict."""
+    answers = []
+    for roles in ((1, 0), (0, 1)):
+        model = with_contact(cases.welded_sheets(tmp_path, tolerance=0.005, contact=False, measured=MEASURED), roles)
+        program, out = compiled(with_form(model, flatness) if flatness else model), tmp_path / f"{roles[0]}.nc"
+        pairs = [pair for pair in program.nominal.pairs if pair.name.startswith("flange")]
+        assert [len(pair.P_m) for pair in pairs] == [len(cases.FLANGE) - len(cases.WELDED)] * 2
+        block = simulate_block(program, program.draws(seed=1, start=0, stop=20))
+        assert (block.status == Status.RESOLVED).all()
+        answers.append(block.measured[:, CORRECTED])
+        tc.run(program, samples=8, seed=1, out=out).close()
+        assert_gaps_recompute(out)
+    assert np.abs(answers[1] - answers[0]).max() < 1e-3 * np.ptp(answers[0], axis=0).max()
+
+
+def test_guns_follow_the_faces_that_they_hold_and_contact_at_guns_alone_is_refused(tmp_path):
+    model = cases.welded_sheets(tmp_path, contact=False)
+    front, rear = model.parts
+    front.feature("edge", front.face("+z", tc.select.Inside((240, -1, 0), (301, 60, 2))), tc.Flatness(0.1))
+    rear.feature("top", rear.face("+z"), tc.Flatness(0.1))  # which guns do not touch
+    nominal = compiled(model).nominal
+    guns = [pair for pair in nominal.pairs if pair.name.startswith("guns")]
+    assert [(pair.name, len(pair.P_m)) for pair in guns] == [("guns of weld.rail", 2), ("guns of weld.rail 2", 3)]
+    assert [[face and face.name for face in pair.deviating] for pair in guns] == [[None, "front.edge"], [None, None]]
+    model = with_contact(cases.welded_sheets(tmp_path, contact=False), (1, 0))
+    points = tuple(model.parts[0].point(x, y, 1) for x, y in cases.FLANGE)
+    with pytest.raises(
+        ModelError, match='contact pair "flange in weld": guns or welds hold its parts at all its contact points'
+    ):
+        compiled(model.replaced(joints=[replace(model.joints[0], at=points)]))
 
 
 def test_an_archive_of_welded_sheets_is_recomputed_and_resumed_to_the_same_bits(tmp_path):

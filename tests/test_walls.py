@@ -202,6 +202,13 @@ def intrusions(tree: ast.AST) -> Iterator[str]:
                 yield f"line {node.lineno}: {ast.unparse(node)}"
 
 
+def test_modules_import_no_private_name_of_another():
+    for file in FILES:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names if is_private(alias.name)] if isinstance(node, ast.ImportFrom) else []
+            assert not names, f"{file.relative_to(PACKAGE)}: {', '.join(names)}"
+
+
 def test_tests_reach_no_private_name_and_change_no_module():
     files = sorted(Path(__file__).parent.rglob("*.py"))
     found = [f"{file.name} {text}" for file in files for text in intrusions(ast.parse(file.read_text(encoding="utf-8")))]

@@ -71,7 +71,8 @@ def _measured(program: Program) -> tuple[np.ndarray, np.ndarray]:
 def _hash(part: NominalPart) -> str:
     elastic = part.part.elasticity
     assert elastic is not None
-    digest = hashlib.sha256(repr((elastic.E, elastic.nu, elastic.density, elastic.pad)).encode())
+    numbers = elastic.E, elastic.nu, elastic.density, elastic.pad
+    digest = hashlib.sha256(repr(numbers if elastic.element_size is None else (*numbers, elastic.element_size)).encode())
     for file in (elastic.stiffness, elastic.nodes):
         digest.update(Path(file).read_bytes() if file is not None else np.asarray(part.mesh.vertices).tobytes())
     return digest.hexdigest()

@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact.compilation.contact_qp import contact_qp, row_count
 from tolcontact.compilation.contact_solver import ContactSolver
-from tolcontact.compilation.program import ContactGroup, Program, _observe_bent
+from tolcontact.compilation.program import ContactGroup, Program, bent_measures
 from tolcontact.mechanics.flexibility import Bending, PartFlexibility, group_flexibility
 from tolcontact.mechanics.pose import ENTRIES
 
@@ -26,7 +26,7 @@ def with_flexibility(program: Program, parts: Sequence[PartFlexibility]) -> Prog
         qp = contact_qp(nominal, compiled.group, program.gaps, program.method, compiled.qp.standing, flexibility=flexibility)
         groups.append(ContactGroup(compiled.group, qp, ContactSolver(qp, program.solver)))
     entries, d = ca.SX.sym("poses", ENTRIES * len(nominal.parts)), ca.SX.sym("deviations", len(nominal.contributors))
-    return replace(program, groups=tuple(groups), bending=bending, observe_bent=_observe_bent(nominal, entries, d, bending))
+    return replace(program, groups=tuple(groups), bending=bending, observe_bent=bent_measures(nominal, entries, d, bending))
 
 
 def stiffer(program: Program, factor: float) -> Program:

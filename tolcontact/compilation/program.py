@@ -192,7 +192,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             trials=trials,
             groups=tuple(ContactGroup(group, qp, ContactSolver(qp, choice)) for group, qp in qps),
             bending=bending,
-            observe_bent=_observe_bent(nominal, entries, d, bending) if bending else None,
+            observe_bent=bent_measures(nominal, entries, d, bending) if bending else None,
             accuracies=measure_accuracies(nominal, groups, draws, place, observe),
             watch=watch.allowing(allowed_depths(nominal, meetings, trials)),
             nominal_measures=_nominal_measures(nominal, observe),
@@ -222,7 +222,7 @@ def _observe(nominal: Nominal, entries: ca.SX, deviations: ca.SX, values: Sequen
     )
 
 
-def _observe_bent(nominal: Nominal, entries: ca.SX, deviations: ca.SX, bending: Bending) -> NamedFunction:
+def bent_measures(nominal: Nominal, entries: ca.SX, deviations: ca.SX, bending: Bending) -> NamedFunction:
     """Return the function of the measures of bent parts, see Program."""
     values = ca.vertcat(*measured(nominal, poses_of(entries), deviations, bending))
     inputs = {"poses": entries, "deviations": deviations, "loads": bending.loads}

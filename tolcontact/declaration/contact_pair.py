@@ -109,9 +109,9 @@ class Joint(Declaration):
     `members` are the joined parts. The pose of the joint is the pose of the first one. A joint that is joined
     again is stated by its parts.
 
-    Elastic parts are joined `at` points of one of them, to the last member. Guns of the station hold them there at their
-    nominal distance. Later stations keep the gaps that three points of each `pad` [mm] have then, or without a pad the point
-    itself.
+    Elastic parts are joined `at` points of one of them, to the last member. Guns of the station hold their faces there, as
+    features deviate, at their nominal distance. Later stations keep the gaps that three points of each `pad` [mm] have then, or
+    without a pad the point itself.
     """
 
     name: str

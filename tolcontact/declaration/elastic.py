@@ -34,6 +34,7 @@ class Elastic(Checked):
     stiffness  file with the stiffness matrix [N/mm] of a finite-element program, without supports, in place of E and nu
     nodes      file with the nodes [mm] of that matrix, in the frame of the part
     pad        [mm] radius over which a force at a point is spread; by default the body's
+    element_size  [mm] longest edge of the tetrahedra of a part that is meshed here; by default by its thickness
     """
 
     E: float | None = None
@@ -42,9 +43,10 @@ class Elastic(Checked):
     stiffness: str | Path | None = None
     nodes: str | Path | None = None
     pad: float | None = None
+    element_size: float | None = None
     declared_at: str = ""
     fault_prefix = "elastic "
-    checks: ClassVar = {"E": MODULUS, "nu": POISSON, "density": DENSITY, "pad": LENGTH}
+    checks: ClassVar = {"E": MODULUS, "nu": POISSON, "density": DENSITY, "pad": LENGTH, "element_size": LENGTH}
 
     def faults(self) -> Iterator[str]:
         yield from super().faults()
@@ -53,13 +55,16 @@ class Elastic(Checked):
             yield "elastic has E or nu and a stiffness; give the material, or the files of a matrix"
         elif has_matrix and self.nodes is None:
             yield 'elastic has a stiffness without nodes; give the file with the nodes of the matrix, as in nodes="nodes.csv"'
+        elif has_matrix and self.element_size is not None:
+            yield "elastic has an element_size and a stiffness; a matrix has the mesh of its program, so leave element_size out"
         elif not has_matrix and (self.E is None or self.nu is None):
             yield "elastic needs E and nu, as in elastic(E=70e3, nu=0.33), or stiffness and nodes"
 
     def __str__(self) -> str:
         if self.stiffness is not None:
             return f"elastic, by {Path(self.stiffness).name}"
-        return f"elastic, E {self.E:g} MPa, nu {self.nu:g}"
+        size = "" if self.element_size is None else f", elements of {self.element_size:g} mm"
+        return f"elastic, E {self.E:g} MPa, nu {self.nu:g}{size}"
 
 
 class Deformable(Declaration):
@@ -72,6 +77,7 @@ class Deformable(Declaration):
     def elastic(
         self, E: float | None = None, nu: float | None = None, *, density: float | None = None,
         stiffness: str | Path | None = None, nodes: str | Path | None = None, pad: float | None = None,
+        element_size: float | None = None,
     ) -> Elastic:  # fmt: skip
         """Declare that forces bend this part: `part.elastic(E=70e3, nu=0.33)`, or by the files of a matrix (see Elastic).
 
@@ -79,10 +85,12 @@ class Deformable(Declaration):
         density           [kg/m^3], which `assembly.gravity` needs
         stiffness, nodes  files of a stiffness matrix [N/mm] without supports, and of its nodes [mm], in place of E and nu
         pad               [mm] radius over which a force at a point is spread
+        element_size      [mm] longest edge of its tetrahedra, smaller than by default if `tolcontact check` asks for it
         """
         refuse_in_functions()
         elastic = Elastic(
-            E=E, nu=nu, density=density, stiffness=stiffness, nodes=nodes, pad=pad, declared_at=script_line()
+            E=E, nu=nu, density=density, stiffness=stiffness, nodes=nodes, pad=pad, element_size=element_size,
+            declared_at=script_line(),
         )  # fmt: skip
         self._declared.append(elastic)
         return elastic

@@ -213,8 +213,9 @@ TITLE_BLOCK = Record(TitleBlock, omitted=" ".join(TitleBlock().entries))
 
 MATRIX_FILE = Plain(Annotated[str, Meta(description="path, from the folder of this file")], _matrix_name, _matrix_file)
 ELASTIC = Record(
-    Elastic, omitted="E nu density stiffness nodes pad", floats="E nu density pad", stiffness=MATRIX_FILE, nodes=MATRIX_FILE
-)
+    Elastic, omitted="E nu density stiffness nodes pad element_size", floats="E nu density pad element_size",
+    stiffness=MATRIX_FILE, nodes=MATRIX_FILE,
+)  # fmt: skip
 
 
 class OfPart(Items):

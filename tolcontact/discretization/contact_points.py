@@ -102,7 +102,7 @@ def contact_points(
         points = replace(points, stiffness=pair.stiffness * _spring_shares(points))
     if balls_and_shafts or not any(deviating):
         return points
-    return replace(points, offsets=_height_offsets(points))
+    return replace(points, offsets=height_offsets(points))
 
 
 def _spring_shares(points: ContactPoints) -> np.ndarray:
@@ -198,7 +198,7 @@ def _touching(
     return P_m[is_touching], P_r[is_touching], n_r[is_touching]
 
 
-def _height_offsets(points: ContactPoints) -> Offsets:
+def height_offsets(points: ContactPoints) -> Offsets:
     """Return the heights of the points from sizes and forms; heights of the moving face count along the reference normal."""
     offsets, facing = list[Offsets](), points.facing
     for face, share, P in zip(points.deviating, (facing, np.ones_like(facing)), (points.P_m, points.P_r), strict=True):

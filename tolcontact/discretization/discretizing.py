@@ -81,8 +81,8 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
     faults.extend(fault for scene in scenes for fault in _reserved_names(scene))
     Faults(dict.fromkeys(faults)).refuse(assembly.name)
     pairs += support_pairs(nominal_parts, scenes)
-    welds, pairs_of_welds = welds_and_pairs(assembly, scenes, nominal_parts, len(labels))
-    nominal = replace(_nominal(assembly, scenes, nominal_parts, (*pairs, *pairs_of_welds), features), welds=welds)
+    welds, all_pairs = welds_and_pairs(assembly, scenes, nominal_parts, features, pairs, len(labels))
+    nominal = replace(_nominal(assembly, scenes, nominal_parts, all_pairs, features), welds=welds)
     Faults(scale_faults(nominal)).refuse(assembly.name)
     return nominal
 

@@ -1,22 +1,28 @@
 """Welds: points at which a joint holds elastic parts together.
 
-The guns of the station that joins them hold the parts at their nominal distance. What gaps the pads then have, along their
-normals and across, each later station keeps: rows of two-sided locators between the parts. The kept gaps are inputs of a
-realization after its deviations.
+The guns of the station that joins them hold the faces of the parts, which deviate with their features as in contact pairs, at
+their nominal distance. What gaps the pads then have, along their normals and across, each later station keeps: rows of
+two-sided locators between the parts. The kept gaps are inputs of a realization after its deviations. What guns and welds hold
+needs no contact point: rows of the same nodes would contradict each other by the squares of rotations.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import trimesh
+from scipy.spatial import KDTree
 
 from tolcontact.declaration import Assembly, Joint
+from tolcontact.discretization.contact_points import height_offsets
 from tolcontact.discretization.locators import NominalPart
 from tolcontact.discretization.nominal import ContactPoints
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.scenes import Scene
 from tolcontact.discretization.weld import Weld
+from tolcontact.elasticity import MAX_OFFSET
 from tolcontact.errors import Faults, GeometryFault, designation
+from tolcontact.features import FaceDeviation, Features
 from tolcontact.geometry.tolerances import ROUNDING
 
 REACH = 0.1  # of the size of the other part: parts that are further apart are not welded
@@ -25,29 +31,55 @@ MAX_CONDITION = 1e6  # of the rows of a joint, with lengths in sizes of the part
 
 
 def welds_and_pairs(
-    line: Assembly, scenes: Sequence[Scene], parts: Sequence[NominalPart], inputs: int
+    line: Assembly,
+    scenes: Sequence[Scene],
+    parts: Sequence[NominalPart],
+    features: Features,
+    pairs: Sequence[ContactPoints],
+    inputs: int,
 ) -> tuple[tuple[Weld, ...], tuple[ContactPoints, ...]]:
-    """Return the welds of all joints at points, whose first input is number `inputs`, and their pairs in all stations.
+    """Return the welds of all joints at points, whose first input is number `inputs`, and all pairs.
 
-    Raises ModelError for points where the parts are too far apart.
+    These are the `pairs` without the contact points that guns or welds hold, and the pairs of the welds in all stations.
+    Raises ModelError for points where the parts are too far apart, and for a pair without any other contact point.
     """
-    faults, welds, pairs = Faults(), list[Weld](), list[ContactPoints]()
+    faults, welds, holding = Faults(), list[Weld](), list[ContactPoints]()
     for joint in line.joints:
         for number, scene in enumerate(scenes):
             if not joint.at or scene.station != joint.station:
                 continue
-            made = faults.attempt(designation("joint", joint), _weld, joint, scene, parts, inputs)
+            made = faults.attempt(designation("joint", joint), _weld, joint, scene, parts, features, inputs)
             if made is not None:
                 welds.append(made[0])
                 inputs += len(made[0].columns)
                 later = [other for other in scenes[number + 1 :] if joint.welded[0] in other.assembly.parts]
-                pairs += [made[1], *(_kept(joint, made[0], scene) for scene in later)]
+                holding += [*made[1], *(_kept(joint, made[0], scene) for scene in later)]
+    free = [faults.attempt(f'contact pair "{pair.name}"', _without_held_points, pair, holding) for pair in pairs]
     faults.refuse(line.name)
-    return tuple(welds), tuple(pairs)
+    return tuple(welds), (*free, *holding)
 
 
-def _weld(joint: Joint, scene: Scene, parts: Sequence[NominalPart], first: int) -> tuple[Weld, ContactPoints]:
-    """Return the weld of a joint, and the pair of its guns in the station that joins the parts."""
+def _without_held_points(pair: ContactPoints, holding: Sequence[ContactPoints]) -> ContactPoints:
+    """Return a pair without its contact points where guns or welds hold its parts. Raises GeometryFault if it has no others."""
+    held = [
+        other.P_m if other.moving == pair.moving else other.P_r
+        for other in holding
+        if {other.moving, other.reference} == {pair.moving, pair.reference}
+    ]
+    if not held or pair.is_supports or pair.round is not None:
+        return pair
+    free = np.flatnonzero(KDTree(np.concatenate(held)).query(pair.P_m)[0] > MAX_OFFSET)
+    if not free.size:
+        raise GeometryFault("guns or welds hold its parts at all its contact points; leave the pair out, or give more points")
+    stiffness = None if pair.stiffness is None else pair.stiffness[free]
+    points = {name: getattr(pair, name)[free] for name in ("P_m", "P_r", "n_r")}
+    return replace(pair, **points, offsets=pair.offsets.take(free), stiffness=stiffness)
+
+
+def _weld(
+    joint: Joint, scene: Scene, parts: Sequence[NominalPart], features: Features, first: int
+) -> tuple[Weld, list[ContactPoints]]:
+    """Return the weld of a joint, and the pairs of its guns in the station that joins the parts."""
     reference, moving = (scene.index(part) for part in joint.welded)
     own, other = parts[reference].body, parts[moving].body
     centres = parts[reference].placed(np.array([point.position for point in joint.at], dtype=float))
@@ -69,12 +101,34 @@ def _weld(joint: Joint, scene: Scene, parts: Sequence[NominalPart], first: int) 
         )
     columns = first + np.arange(len(P_r))
     weld = Weld(scene.station, moving, reference, P_m[len(centres) :], P_r, n_r, columns)
-    at_guns = P_m[: len(centres)]
-    none = Offsets.joined([], len(centres))
-    guns = ContactPoints(
-        f"guns of {scene.label(joint.name)}", moving, reference, at_guns, at_guns, normals, none, holds=True, elastic=True
-    )
-    return weld, guns
+    deviating = [
+        (_face_at(features, parts[moving], point, -n), _face_at(features, parts[reference], centre, n))
+        for point, centre, n in zip(P_m, centres, normals, strict=False)
+    ]
+    return weld, list(_guns(scene.label(joint.name), weld, P_m[: len(centres)], normals, deviating))
+
+
+def _face_at(features: Features, part: NominalPart, point: np.ndarray, n: np.ndarray) -> FaceDeviation | None:
+    """Return how the face of a part at a point [mm], with outward normal n, deviates with its feature and expands."""
+    R, t = part.placement
+    position = (point - t) @ R
+    of_part = (nominal for nominal in features.features.values() if nominal.feature.part is part.part and nominal.varies)
+    feature = next((nominal.feature for nominal in of_part if nominal.has_moving_face(position, n @ R)), None)
+    deviation = None if feature is None else features.face_of(feature, position, part.placement)
+    return features.at_point(deviation, part.part, point, part.placement)
+
+
+def _guns(
+    name: str, weld: Weld, P: np.ndarray, n: np.ndarray, deviating: Sequence[tuple[FaceDeviation | None, FaceDeviation | None]]
+) -> Iterator[ContactPoints]:
+    """Yield the guns of a weld at points P (gun, 3) with normals n (gun, 3): a pair for each two faces that they hold."""
+    for number, faces in enumerate(dict.fromkeys(deviating), 1):
+        held = [k for k, other in enumerate(deviating) if other == faces]
+        guns = ContactPoints(
+            f"guns of {name}" + (f" {number}" if number > 1 else ""), weld.moving, weld.reference, P[held], P[held], n[held],
+            Offsets.joined([], len(held)), deviating=faces, holds=True, elastic=True,
+        )  # fmt: skip
+        yield replace(guns, offsets=height_offsets(guns))
 
 
 def _pad_rows(centre: np.ndarray, n: np.ndarray, pad: float | None) -> list[tuple[np.ndarray, np.ndarray]]:

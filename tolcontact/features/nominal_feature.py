@@ -15,7 +15,7 @@ from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import ON_FACE
 
 Placement = tuple[np.ndarray, np.ndarray]  # R (3, 3) and t (3,) [mm] of a part in the nominal assembly
-ALONG_NORMAL = 0.999  # cosine of the angle between the direction of a locator and the normal of the face that it stands on
+ALONG_NORMAL = 0.999  # cosine of the angle between the direction of a locator or gun and the normal of the face that it is on
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +123,15 @@ class NominalFeature:
         if isinstance(geometry, AxisFeature):
             arm = arm - (arm @ geometry.axis) * geometry.axis
         return 0 if not isinstance(geometry, FeatureOfSize) or np.linalg.norm(arm) > geometry.size / 4 else None
+
+    def has_moving_face(self, position: np.ndarray, normal: np.ndarray) -> bool:
+        """Return whether a face that deviates lies at a point (3,) [mm], with this outward `normal` (3,)."""
+        for surface, moves in zip(self.surfaces, moving_faces(self.feature), strict=True):
+            place, normals, is_over = surface.project(position[None])
+            is_on_face = is_over[0] and np.linalg.norm(place[0] - position) <= ON_FACE * surface.mesh.scale
+            if moves and is_on_face and normals[0] @ normal > ALONG_NORMAL:
+                return True
+        return False
 
     def face_under(self, position: np.ndarray, direction: np.ndarray) -> int | None:
         """Return the index of the face of a size that a locator at a point (3,) [mm] stands on; None for the centre.

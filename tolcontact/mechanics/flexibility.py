@@ -165,7 +165,7 @@ def _source(entry: NominalPart) -> MeshSource | MatrixSource:
     R, _ = mesh.metadata.get(FROM_PRODUCT, (np.eye(3), None))
     is_mirrored = np.linalg.det(R) < 0  # which is no solid of its file
     step = geometry.source if isinstance(geometry, Mesh) and geometry.is_step and not is_mirrored else None
-    return MeshSource(mesh.vertices, mesh.faces, elastic.E, elastic.nu, elastic.density, step)
+    return MeshSource(mesh.vertices, mesh.faces, elastic.E, elastic.nu, elastic.density, step, elastic.element_size)
 
 
 def with_weights(group: Group, nominal: Nominal, bodies: Bodies) -> Group:
@@ -184,11 +184,11 @@ def with_weights(group: Group, nominal: Nominal, bodies: Bodies) -> Group:
 
 
 def _weight(position: int, part: NominalPart, body: ElasticBody, nominal: Nominal) -> Load:
-    """Return the resultant of the weight of a part, which acts at the centre of its mass."""
-    forces = _nodal_weight(part, body, nominal).reshape(-1, 3)
-    total, moment = forces.sum(axis=0), np.cross(body.nodes, forces).sum(axis=0)
+    """Return the weight of a part at its centre of mass, so that moments are right however contact turns the part."""
     R, _ = part.placement
-    return Load(position, part.placed(np.cross(total, moment) / (total @ total)), R @ total)
+    return Load(
+        position, part.placed(body.shares @ body.nodes), R @ _nodal_weight(part, body, nominal).reshape(-1, 3).sum(axis=0)
+    )
 
 
 def _nodal_weight(part: NominalPart, body: ElasticBody, nominal: Nominal) -> np.ndarray:

@@ -263,8 +263,8 @@ def _uncertainties(draws: TrialDraws, errors: Float[Array, " measure"]) -> Itera
         yield f"{name}: uncertain by {stated}"
         if not share <= MAX_SHARE:
             _doubt(
-                f"{designation}: it is uncertain by {stated} of elastic parts (at most {MAX_SHARE:g} is expected); import a "
-                "stiffness matrix of a finer mesh, or of shells"
+                f"{designation}: it is uncertain by {stated} of elastic parts (at most {MAX_SHARE:g} is expected); give a "
+                "smaller element_size, or import a stiffness matrix of shells"
             )
     if len(rows) > MAX_LISTED:
         yield f"{len(rows) - MAX_LISTED} more measurements: uncertain by no larger share"
