@@ -140,7 +140,8 @@ def main() -> int:
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     models = {path.stem: (lambda path=path: frames.model(path.stem), None) for path in sorted(frames.MODELS.glob("*.py"))}
-    cases, differing = SCENES | AT_NIGHT | models, 0
+    cases: dict[str, Any] = SCENES | AT_NIGHT | models
+    differing = 0
     for name in options.names or cases:
         try:
             declare, solver = cases[name]
