@@ -65,8 +65,8 @@ def sorted_candidates(
     ):
         rows = np.flatnonzero((kinds == kind) & (planes < 0))
         ridges[rows] = _planes_beyond(body, body.facet_planes[of_planes])[body.facet_planes[facets[rows]]]
-    centre = A.vertices.mean(axis=0)
-    ball = np.append(centre, np.linalg.norm(A.vertices - centre, axis=1).max())
+    centre = A.facets.mean(axis=(0, 1))
+    ball = np.append(centre, np.linalg.norm(A.vertices - centre, axis=1).max(initial=0.0))
     return Candidates(
         kinds, firsts, seconds, planes, ridges, facing, *by_owner[1:], CLEARANCE_SHARE * clearances, ball,
         boxes[by_owner.order], frames, *_in_bands(outlines),
