@@ -243,8 +243,14 @@ SLOW = (
 )
 
 
-@pytest.mark.parametrize("model, resolution, samples", [*QUICK, *nightly(*SLOW)])
-@pytest.mark.parametrize("plugin", ["daqp", *nightly("qpoases")])
+# DAQP misses the answers of qpOASES to channel.py by 1.8e-9 mm in one of 60 realizations; the kernel misses them by 1.1e-10.
+PLUGIN_BY_DAY = {"channel": "qpoases"}
+BY_DAY = [(*case, PLUGIN_BY_DAY.get(case[0], "daqp")) for case in QUICK]
+AT_NIGHT = [(*case, plugin) for case in (*QUICK, *SLOW) for plugin in ("daqp", "qpoases")]
+AT_NIGHT = [case for case in AT_NIGHT if case not in BY_DAY and case != ("channel", "linearized", 60, "daqp")]
+
+
+@pytest.mark.parametrize("model, resolution, samples, plugin", [*BY_DAY, *nightly(*AT_NIGHT)])
 def test_models_have_the_answers_of_plugins(model, resolution, samples, plugin):
     method = {"resolution": resolution}
     expected, actual = (poses_and_status(model, name, method, samples) for name in (plugin, "graph"))
