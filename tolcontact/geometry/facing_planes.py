@@ -5,8 +5,8 @@ import trimesh
 
 from tolcontact.arrays import Array, Bool, Int
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
+from tolcontact.geometry.outlines import plane_of
 from tolcontact.geometry.polyhedron import Polyhedron
-from tolcontact.geometry.triangle_mesh import edges
 
 FACING = -0.99  # cosine of the angle between the normals of planes that face each other
 STRAIGHT = 1e-6  # rad: a larger interior angle than a straight one is reflex
@@ -60,11 +60,9 @@ def moot_corners(A: Polyhedron, B: Polyhedron, facets: Int[Array, "plane 2"], ta
 
 def _reflex_corners(body: Polyhedron, facet: int) -> Bool[Array, " v"]:
     """Return at which corners the plane of a facet has a single interior angle, of more than 180 degrees (v,)."""
-    triangles = body.facets[body.facet_planes == body.facet_planes[facet]]
-    corners, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    angles = np.bincount(numbers.ravel(), weights=trimesh.triangles.angles(triangles).ravel())
-    ends, edge, count = edges(numbers.reshape(-1, 3))
-    on_rim = np.bincount(ends[count[edge] == 1].ravel(), minlength=len(corners))
+    corners, numbers, rim = plane_of(body, facet)
+    angles = np.bincount(numbers.ravel(), weights=trimesh.triangles.angles(corners[numbers]).ravel())
+    on_rim = np.bincount(rim.ravel(), minlength=len(corners))
     reflex = corners[(angles > np.pi + STRAIGHT) & (on_rim == 2)]
     _, same = np.unique(np.concatenate([reflex, body.vertices]), axis=0, return_inverse=True)
     return np.isin(same.ravel()[len(reflex) :], same.ravel()[: len(reflex)])

@@ -15,10 +15,17 @@ def outline(body: Polyhedron, facet: int) -> Float[Array, "segment 2 3"]:
 
     The face is on their left, as seen from outside.
     """
+    corners, _, rim = plane_of(body, facet)
+    return np.asarray(corners[rim])
+
+
+def plane_of(body: Polyhedron, facet: int) -> tuple[Float[Array, "c 3"], Int[Array, "t 3"], Int[Array, "segment 2"]]:
+    """Return the plane of a facet: corners [mm], and the indices of corners of its triangles and of the ends of its outline."""
     triangles = body.facets[body.facet_planes == body.facet_planes[facet]]
     corners, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    ends, edge, count = edges(numbers.reshape(-1, 3))
-    return np.asarray(corners[ends[count[edge] == 1]])
+    numbers = numbers.reshape(-1, 3)
+    ends, edge, count = edges(numbers)
+    return corners, numbers, ends[count[edge] == 1]
 
 
 def across(normal: Float[Array, "3"]) -> Float[Array, "2 3"]:
@@ -28,19 +35,23 @@ def across(normal: Float[Array, "3"]) -> Float[Array, "2 3"]:
     return np.stack([direction, np.cross(normal, direction)])
 
 
-def hole_clearances(A: Polyhedron, B: Polyhedron, facing: Int[Array, "plane 2"]) -> Float[Array, "edge plane"]:
+def hole_clearances(
+    A: Polyhedron, B: Polyhedron, facing: Int[Array, "plane 2"], outlines: list[Float[Array, "segment 2 3"]]
+) -> Float[Array, "edge plane"]:
     """Return how far [mm] bodies may move before edges of A around holes in facing planes matter (edge, plane); 0 for others.
 
     The gap of two planes is linear, and smallest at a corner of the convex hull of their overlap. This is no corner of a hole
     as long as the hole lies inside the outlines of both planes. A hole that meets another outline counts as a part of it.
+
+    outlines   of the plane of A and of the plane of B, for each pair of facing planes in turn
     """
     clearances = np.zeros((len(A.edges), len(facing)))
     for plane, facets in enumerate(facing):
         normals = A.normals[facets[0]], B.normals[facets[1]]
         frame = across(normals[1])
         loops, are_holes = [], list[bool]()
-        for body, facet, normal in zip((A, B), facets, normals, strict=True):
-            of_body = _loops(outline(body, facet))
+        for segments, normal in zip(outlines[2 * plane : 2 * plane + 2], normals, strict=True):
+            of_body = _loops(segments)
             loops += of_body
             are_holes += [_is_hole(loop, normal) for loop in of_body]
         for k, clearance in _holes([loop @ frame.T for loop in loops], are_holes).items():

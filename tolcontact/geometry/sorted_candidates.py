@@ -39,8 +39,8 @@ def sorted_candidates(
     kinds, firsts, seconds, planes = table.T
     frames = np.array([[across(body.normals[k]) for body, k in zip((A, B), facets, strict=True)] for facets in facing])
     frames = frames.reshape(-1, 2, 2, 3)
-    outlines = [outline(body, k) @ frame.T for facets, body_frames in zip(facing, frames, strict=True)
-                for body, k, frame in zip((A, B), facets, body_frames, strict=True)]  # fmt: skip
+    in_space = [outline(body, k) for facets in facing for body, k in zip((A, B), facets, strict=True)]
+    outlines = [segments @ frame.T for segments, frame in zip(in_space, frames.reshape(-1, 2, 3), strict=True)]
     boxes = np.tile([-np.inf, -np.inf, np.inf, np.inf], (len(table), 1))
     for plane in range(len(facing)):
         for kind, coordinates in (
@@ -57,7 +57,7 @@ def sorted_candidates(
     leaders = by_owner.runs[:-1]
     is_edge = (kinds[leaders] == EDGE_ON_EDGE) & (planes[leaders] >= 0) & (not has_form)
     clearances = np.zeros(len(leaders))
-    clearances[is_edge] = hole_clearances(A, B, facing)[firsts[leaders[is_edge]], planes[leaders[is_edge]]]
+    clearances[is_edge] = hole_clearances(A, B, facing, in_space)[firsts[leaders[is_edge]], planes[leaders[is_edge]]]
     ridges = np.full(len(kinds), -1)
     for kind, body, facets, of_planes in (
         (CORNER_ON_FACET, B, seconds, facing[:, 1]),

@@ -7,7 +7,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
-from tolcontact.geometry.outlines import hole_clearances
+from tolcontact.geometry.outlines import hole_clearances, outline
 from tolcontact.geometry.surface import Surface
 
 THICKNESS = 10.0
@@ -76,7 +76,9 @@ def test_a_hole_counts_where_it_holds_a_corner_of_the_other_plate():
 
 def test_a_hole_that_meets_an_outline_counts_wherever_bodies_are():
     found = between(drilled(27, [0, 20], up=True), drilled(30, [25], up=False))
-    clearances = hole_clearances(found.moving, found.reference, found.candidates.facing)[:, 0]
+    facing = found.candidates.facing
+    outlines = [outline(body, facet) for body, facet in zip((found.moving, found.reference), facing[0], strict=True)]
+    clearances = hole_clearances(found.moving, found.reference, facing, outlines)[:, 0]
     around = np.hypot(*(found.moving.edges.mean(axis=1)[:, :2] - [0, 8]).T) < 5
     assert around.any() and clearances[around] == pytest.approx(8, abs=1e-9)  # from its own outline
     assert not clearances[~around].any()  # the hole at x = 20 meets one of the other plate, which meets the rim at x = 27
