@@ -28,7 +28,8 @@ from tolcontact.interference import ordered
 
 SAME_CONFLICT = 1e-3  # conflicts whose penetration differs by less than this share count as the same
 UNMOVED = 1e-9  # mm: contact moves bodies by more
-MIN_GAIN = 1e-6  # of the objective, or mm of penetration: the gain for which another start is preferred
+MIN_GAIN = 1e-6  # mm of penetration: the gain for which another start is preferred
+MIN_SLANT = 0.02  # rad: rims whose gap has a smaller slope lose less than a thousandth of the objective
 
 
 class ContactResolver:
@@ -223,6 +224,8 @@ class ContactResolver:
         if which == "not separated":
             rows = np.flatnonzero(state.outcome >= Outcome.DOUBTFUL)
             return rows[~state.solved[rows] | interfere(state.relative[rows])]
+        if which == "slanted":
+            return np.flatnonzero(state.certified & (self._candidates.slants(state) > MIN_SLANT))
         is_uncertain = state.outcome >= (Outcome.DOUBTFUL if which == "no answer" else Outcome.IN_CONFLICT)
         return np.flatnonzero(is_uncertain | (~self._limits.is_near(task, state) if which == "uncertain or far" else False))
 
@@ -241,7 +244,7 @@ class ContactResolver:
         self._attempt(part, attempt, start)
         accumulate_starts(state, rows, attempt)
         best = state.take(rows)
-        better = is_better(attempt, self._energy_of(part, attempt), best, self._energy_of(part, best))
+        better = is_better(attempt, self._energy_of(part, attempt), best, self._energy_of(part, best), start.gain)
         state.put(rows[better], attempt.take(better))
         return rows[~state.certified[rows] & ~is_same_conflict(attempt, best)]
 
@@ -262,14 +265,16 @@ class ContactResolver:
         return poses, self._relate(poses=poses, deviations=task.deviations)
 
 
-def is_better(state: State, energy: Float[Array, " n"], best: State, best_energy: Float[Array, " n"]) -> Bool[Array, " n"]:
+def is_better(
+    state: State, energy: Float[Array, " n"], best: State, best_energy: Float[Array, " n"], gain: float
+) -> Bool[Array, " n"]:
     """Return whether answers are better than the best ones so far (n,).
 
     A less severe outcome is better, but a doubtful answer is as bad as none. Of two certified answers, the one with less energy
-    (n,) is better; of two conflicts, the shallower.
+    (n,) is better, by a share `gain`; of two conflicts, the shallower.
     """
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
-    is_lower = energy < best_energy - MIN_GAIN * np.abs(best_energy)
+    is_lower = energy < best_energy - gain * np.abs(best_energy)
     outcome, best_outcome = (np.minimum(answer.outcome, Outcome.DOUBTFUL) for answer in (state, best))
     is_shallower = (outcome == Outcome.IN_CONFLICT) & (depth < best_depth - MIN_GAIN)
     gains = np.where(outcome == Outcome.RESOLVED, is_lower, is_shallower)

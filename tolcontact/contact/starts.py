@@ -25,6 +25,8 @@ class Start(NamedTuple):
     guarded      whether bodies that interfere where no place of contact shows it get such a place (see Guard)
     parted       whether convex bodies are separated only in the best direction (see Parting)
     free         whether bodies are moved apart first, and steps end before they enter each other (see FreeSteps)
+    sloped       whether rows of rims that cross have the slope of their gap (see Meeting.with_slopes)
+    gain         share of the objective by which a certified answer must be better than another one
     """
 
     at_nominal: bool = False
@@ -35,14 +37,17 @@ class Start(NamedTuple):
     guarded: bool = False
     parted: bool = False
     free: bool = False
+    sloped: bool = False
+    gain: float = 1e-6
 
 
 class Rescue(NamedTuple):
-    """Other starts for realizations whose best answer so far is not certain. A better answer replaces it.
+    """Other starts for realizations whose best answer so far is not certain, or no optimum. A better answer replaces it.
 
     rows      the realizations: "apart", whose raw bodies are apart although gaps deny it; "no answer"; "interfere", with bodies
               that interfere in their answer; "uncertain", not certified; "uncertain or far", these and certified ones far from
-              their raw pose; "not separated", without an answer, or with bodies that interfere in it
+              their raw pose; "not separated", without an answer, or with bodies that interfere in it; "slanted", certified ones
+              that rims carry where the slope of their gap differs from the normal of the plane
     surfaces  which pairs the group must have: "any", "curved" faces or only "flat" ones, no pair of bounded faces whose bodies
               are not tested for interference ("guarded"), or convex bodies that are parted in one direction ("convex")
     starts    one after the other, until the answer is certified, or two of them end in the same conflict
@@ -80,4 +85,7 @@ RESCUES = (
             Start(guarded=True, stride=SHORT_STRIDES[0]),
         ),
     ),
+    # Rows with the normal of the plane end at the same answer from everywhere, which may be beside the optimum. Rows with the
+    # slope end at one of several optima. It must be clearly better: else answers would depend on the rounding of solvers.
+    Rescue("slanted", "any", (Start(sloped=True, at_answer=True, gain=1e-4),)),
 )

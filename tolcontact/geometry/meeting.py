@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel, places_kernel
 from tolcontact.geometry.facing_planes import facing_planes, moot_corners
@@ -40,6 +41,7 @@ DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 ARC = np.linspace(0, 1, 17)  # shares at which the normals between two facets are compared
 ARC_SPACING = np.pi / 16  # rad: the largest angle between two of them
+MIN_SLANT = 1.02  # lengths of slopes that always count
 BLOCK_ARCS = 4096  # pairs of edges whose arcs are compared in one block
 
 
@@ -86,6 +88,7 @@ class Meeting:
     overhang [mm]: largest distance outside its edges at which a contact point counts
     has_form whether faces have form, so that planes may touch first at any of their corners
     is_free  whether bodies are free, so that no contact point is behind another one
+    slant    length from which the slope of a gap between rims counts, and not the normal of the plane, whose length is 1
     """
 
     moving: Polyhedron
@@ -96,6 +99,7 @@ class Meeting:
     has_form: bool = field(kw_only=True)
     overhang: float = field(default=0.0, kw_only=True)
     is_free: bool = field(default=False, kw_only=True)
+    slant: float = field(default=MIN_SLANT, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.candidates.kinds)
@@ -103,6 +107,30 @@ class Meeting:
     def of_free_bodies(self, overhang: float = 0.0) -> "Meeting":
         """Return the same candidates for bodies that are free; they count up to `overhang` [mm] outside their edges."""
         return replace(self, overhang=overhang, is_free=True)
+
+    def with_slopes(self) -> "Meeting":
+        """Return the same candidates; those where rims of facing planes cross have the slope of their gap as normals."""
+        return replace(self, slant=1.0)
+
+    def slants(self, X_RM: Float[Array, "n 12"], labels: Int[Array, " n"]) -> Float[Array, " n"]:
+        """Return the tangents of the angles between the slope of the gap and the plane's normal, at poses (n, 12).
+
+        Only candidates where rims of facing planes cross have a slope that differs; of others, and of those of extended
+        meetings, 0 is returned.
+        """
+        found, candidates = np.zeros(len(labels)), self.candidates
+        rows = np.flatnonzero((labels >= 0) & (labels < len(self)))
+        rows = rows[(candidates.kinds[labels[rows]] == kernel.EDGE_ON_EDGE) & (candidates.planes[labels[rows]] >= 0)]
+        chosen = labels[rows]
+        d = np.einsum(
+            "nij,nj->ni", pose.rotation(X_RM[rows]), np.diff(self.moving.edges[candidates.firsts[chosen]], axis=1)[:, 0]
+        )
+        e = np.diff(self.reference.edges[candidates.seconds[chosen]], axis=1)[:, 0]
+        n = self.reference.normals[candidates.facing[candidates.planes[chosen], 1]]
+        c = np.cross(d, e)
+        across = np.abs((c * n).sum(axis=1))
+        found[rows] = np.linalg.norm(np.cross(c, n), axis=1) / np.maximum(across, kernel.TINY)
+        return found
 
     @property
     def kinds(self) -> Int[Array, " c"]:
@@ -118,7 +146,7 @@ class Meeting:
         travel, tilt = EXTENSION_FACTOR * self.reach.travel, EXTENSION_FACTOR * (self.reach.tilt + TILT_MARGIN)
         reach = self.reach._replace(travel=travel, tilt=tilt)
         extended = _meeting(self.moving, self.reference, reach, self.size, has_form=self.has_form)
-        return None if extended is None else replace(extended, overhang=self.overhang, is_free=self.is_free)
+        return None if extended is None else replace(extended, overhang=self.overhang, is_free=self.is_free, slant=self.slant)
 
     @property
     def turn(self) -> float:
@@ -208,7 +236,9 @@ class Meeting:
         )
         count = places_kernel.find(
             self.moving, self.reference, self.candidates,
-            np.array([self.reach.depth, self.reach.height, np.inf if self.is_free else _passed(self.reach, self.size)]),
+            np.array(
+                [self.reach.depth, self.reach.height, np.inf if self.is_free else _passed(self.reach, self.size), self.slant]
+            ),
             kernel.MARGIN * self.size + self.overhang,
             np.array([error, self.reach.depth, nearness, self.overhang]),
             np.ascontiguousarray(X_RM), retained, ceilings, DIRECTIONS, *places,

@@ -300,8 +300,8 @@ def find(  # type: ignore[no-untyped-def]
 
     A, B          Body, the moving and the reference one
     candidates    Candidates
-    reach         (3,) [mm]: the largest depth and the largest gap of a contact point; the nominal depth beyond which a body
-                  must have penetrated elsewhere
+    reach         (4,): the largest depth and the largest gap [mm] of a contact point; the nominal depth [mm] beyond which a
+                  body must have penetrated elsewhere; the length from which the slope of a gap between rims counts
     margin        [mm]: largest distance of contact points outside edges
     error         (4,): the permitted error [mm] of facing planes outside their edges, the margin [mm] where it is permitted,
                   the distance in margins from a point where they touch, and the largest depth [mm] of a corner that counts
