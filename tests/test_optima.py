@@ -27,7 +27,8 @@ def test_nor_where_faces_end_within_reach(name):
     assert_best(judged(case_scene(*case(name)), samples=8, seed=1, starts=1))
 
 
-CORNERS_ON_EDGES = [(92199, 3), *nightly((92230, 3))]  # convex edges of whole bodies
+# The rim of a face crosses another one; a corner lies on a convex edge of a whole body.
+CORNERS_ON_EDGES = [(92006, 2), *nightly((92003, 2), (92199, 3), (92230, 3))]
 
 
 @pytest.mark.parametrize(("seed", "samples"), CORNERS_ON_EDGES)

@@ -1,10 +1,14 @@
 """Forces, one-sided locators and springs: who carries, and how much."""
 
 import itertools
+import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests import cases
@@ -155,3 +159,42 @@ def test_springs_share_a_push_by_their_stiffness():
     # Statics: forces 20 N/mm * left and 1 N/mm * right balance about the rest.
     assert 20 * left * rest == pytest.approx(1 * right * (100 - rest), rel=1e-5)
     assert run["reaction"][0, 0] == pytest.approx(20 * left + right, rel=1e-4)  # the normal tilts with the bar
+
+
+def ring_on_a_pin(turn=(0, 0, 0), push=(0, 0, 0), last=None) -> tc.Assembly:
+    """A ring on a plate around a pin, pushed down and sideways at a point; stops stand 1 mm beside it."""
+    a, R = tc.Assembly("ring", method=SEATED), Rotation.from_rotvec(turn)
+    plate = a.part("plate", tc.Box(100, 100, 10), at=R.apply((-50, -50, -10)), rotation=turn, fixed=True)
+    pin = a.part("pin", tc.Pin(19.8, 30), at=R.apply((0, 0, 25.5)), rotation=turn, fixed=True)
+    ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(10, 20, 10, sections=48)), at=R.apply((0, 0, 5)), rotation=turn)
+    stops = "Z1:15,0,-5:z", "Z2:-15,0,-5:z", "Z3:0,15,-5:z", "X:-20,0,0:x", "Y1:0,-20,0:y", "Y2:3,-19.5,0:y"
+    locators = cases.parked(*stops, away=1)
+    a.locate(ring, locators if last is None else [*locators[:-1], last], tolerance=0.1)
+    a.force("push", at=ring.point(*push), vector=R.apply((3, 1, -10)))
+    a.contact("floor", moving=ring.face("-z"), reference=plate.face("+z"))
+    a.contact("bore", moving=ring.face(tc.select.Cylinder(radius=10)), reference=pin.face(tc.select.Cylinder(radius=9.9)))
+    a.measure("radial", ring.point(20, 0, 5), along=R.apply((1, 0, 0)), tolerance=1)
+    a.measure("mark", ring.point(20, 0, 5), along=R.apply((0, 1, 0)), tolerance=1)
+    return a
+
+
+BESIDE = tc.Locator("S", (20, 0, 0), "y", one_sided=True)
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0.4, -1.1, 0.7)])
+@pytest.mark.parametrize("last, push, is_free", [
+    (None, (0, 0, 0), True),
+    (BESIDE, (0, 0, 0), True),
+    (BESIDE, (4, -12, 0), False),  # the push rotates the ring onto the stop
+    (tc.Locator("S", (20, 0, 0), "y"), (0, 0, 0), False),
+])  # fmt: skip
+def test_a_rotation_that_nothing_holds_is_named_with_its_axis(turn, last, push, is_free):
+    with warnings.catch_warnings(record=True) as records:
+        warnings.simplefilter("always")
+        tc.build(ring_on_a_pin(turn, push, last), solver="daqp")
+    (found,) = [str(record.message) for record in records if "nothing holds its rotation" in str(record.message)] or [""]
+    assert ('but "mark" depends on it' in found) == is_free
+    if is_free:
+        point, axis = (np.array(list(map(float, text.split(", ")))) for text in re.findall(r"\(([-\d., e]+)\)", found))
+        up = Rotation.from_rotvec(turn).apply((0, 0, 1))
+        assert np.linalg.norm(np.cross(axis, up)) < 1e-3 and np.linalg.norm(np.cross(point, up)) < 1e-2

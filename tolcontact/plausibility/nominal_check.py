@@ -13,6 +13,7 @@ from tolcontact.plausibility.faces import measured_forms, partial_surfaces
 from tolcontact.plausibility.measures import assumed_sides, measure_limits, measured_reach, rotations, wide_tolerances
 from tolcontact.plausibility.pairs import (
     coarse_pairs,
+    free_turns,
     pair_clearances,
     pair_overlaps,
     repeated_pairs,
@@ -36,7 +37,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "clash": (clashes, clashes_beyond_faces),
     "gap": (pair_clearances,),
     "twice": (repeated_pairs,),
-    "rotation": (unconstrained_rotations,),
+    "rotation": (unconstrained_rotations, free_turns),
     "limits": (measure_limits,),
     "side": (assumed_sides,),
     "reach": (measured_reach,),

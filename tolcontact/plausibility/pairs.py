@@ -4,17 +4,20 @@ from collections import defaultdict
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from tolcontact import poses as pose
 from tolcontact.declaration import ContactPair, Face, Inside, Part
 from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.geometry.curvature import CHORD_SHARE
 from tolcontact.mechanics.displacement import central_moments, moments_about
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
-from tolcontact.statics import balances, drawn_contacts
+from tolcontact.statics import TouchingPoints, balances, contacts_at, drawn_contacts
 
 FAR_SIGMAS = 30.0  # of a gap: contact beyond does not act
 MIN_SHARE = 1e-5  # of a face's size: overlaps and gaps below are rounding of coordinates
 MIN_RANGE_SHARE = 0.05  # of the smallest tolerance range
+SMALL_TURN = 1e-3  # rad
 MIN_ARM = 0.03  # sizes of a part: root mean square distance of its contact points from the line closest to them
 
 
@@ -120,6 +123,36 @@ def unconstrained_rotations(draws: TrialDraws) -> Iterator[str]:
                     f'square; it is {size:.3g} mm large), so that objective "{method.objective}" hardly holds its rotation '
                     'about the line; choose objective "locator stiffness", or spread its contact points'
                 )
+
+
+def free_turns(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each part with a rotation that nothing holds against forces, and that a measurement depends on.
+
+    All contact points count, whether they touch nominally or not, since forces close gaps.
+    """
+    nominal = draws.program.nominal
+    if not draws.program.method.minimizes.presses or draws.program.bending is not None:
+        return
+    pairs = [pair for pair in nominal.pairs if not pair.is_supports]
+    at_rest = np.tile(pose.AT_REST, (len(nominal.parts), 1))
+    for balance in balances(contacts_at(nominal, at_rest, [TouchingPoints(pair.P_r, pair.n_r) for pair in pairs])):
+        for part, point, axis in balance.free_turns():
+            poses = np.tile(at_rest, (2, 1, 1))
+            R = Rotation.from_rotvec(np.outer((-SMALL_TURN, SMALL_TURN), axis)).as_matrix()
+            poses[:, part] = np.concatenate([R.reshape(2, 9), point - R @ point], axis=1)
+            at = draws.program.observe(poses=poses, deviations=np.zeros((2, draws.deviations.shape[1])))["measured"]
+            moved = np.abs(at[1] - at[0]) > MIN_SHARE * SMALL_TURN * nominal.parts[part].mesh.scale
+            names = [f'"{measure.name}"' for measure, moves in zip(nominal.measures, moved, strict=True) if moves]
+            if names:
+                yield (
+                    f"{nominal.parts[part].part.designation}: nothing holds its rotation about the line through "
+                    f"{_vector(point)} along {_vector(axis)}, and no force causes it, but {', '.join(names)} "
+                    f"{'depends' if len(names) == 1 else 'depend'} on it; give the part a two-sided locator across this line"
+                )
+
+
+def _vector(values: np.ndarray) -> str:
+    return f"({', '.join(f'{value + 0.0:.4g}' for value in np.round(values, 6))})"
 
 
 def unused_forces(draws: TrialDraws) -> Iterator[str]:

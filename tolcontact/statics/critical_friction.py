@@ -14,6 +14,8 @@ from tolcontact.statics.touching import Contact, Touching, across, wrenches
 HIGH_FRICTION = 0.5  # coefficient: higher ones are unusual
 MIN_LOAD = 1e-9  # of the sum of all forces: a smaller load is rounding
 MAX_UNBALANCED = 1e-7  # of the sum of all forces: a smaller load component that no contact can balance is rounding
+MAX_TURNED = 1e-6  # of the largest singular value of contacts: a motion that displaces them less is free
+MIN_TURN = 1e-3  # share of rotation in a motion: a smaller one is rounding
 MIN_GUIDE = 1e-9  # of the largest singular value of the guides: a smaller one is rounding
 
 
@@ -64,6 +66,30 @@ class Balance:
             others = [other for other in self.contacts if other != index]
             critical, shares = self._critical(others, self._equal(others))
             yield Seat(self._touching.contacts[index], critical, self._reserve(others, critical), shares)
+
+    def free_turns(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        """Yield each part that can rotate by itself, to first order, though forces press it: a point (3,) [mm], an axis (3,).
+
+        Its rotation about the axis opens and closes no contact that a load presses together without friction, and takes no
+        work. Contacts that carry in no balance of the forces, such as a stop beside the part, do not hold it.
+        """
+        smooth = self._cones(self.contacts, 0 * self._equal(self.contacts))
+        if not self._is_loaded(smooth) or smooth.held(0.0) <= MIN_HELD:
+            return
+        owners, holds = self._owners(self.contacts), set[int]()
+        for index in self.contacts:
+            contact, points = self._touching.contacts[index], np.flatnonzero(owners == index)
+            if contact.is_guide or len(points) > 1 or smooth.can_carry(int(points[0])):
+                holds.add(index)
+        contacts = [self._touching.contacts[index] for index in sorted(holds)]
+        W = np.hstack([self._wrenches(contact, contact.normals) for contact in contacts])
+        for k, part in enumerate(self.parts):
+            U, sizes, _ = np.linalg.svd(W[6 * k : 6 * k + 6])
+            motions = U[:, int((sizes > MAX_TURNED * sizes.max(initial=0.0)).sum()) :]
+            for motion in motions.T if motions.shape[1] == 1 else ():
+                turn, size = motion[3:], float(np.linalg.norm(motion[3:]))
+                if size > MIN_TURN and abs(motion[:3] @ turn) < MAX_TURNED * size:
+                    yield part, self._centre + self._length * np.cross(turn, motion[:3]) / size**2, turn / size
 
     def _reserve(self, indices: Sequence[int], critical: float) -> float:
         """Return the smallest factor of the stated coefficients of contacts (k,); NaN if one of them has none."""

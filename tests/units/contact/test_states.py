@@ -82,7 +82,7 @@ def test_another_answer_is_preferred_by_its_rank_then_its_energy_or_its_depth():
     certified, conflict, deeper, none = state(0.0, [0.0]), state(0.0, [0.01]), state(0.0, [0.02]), state(1.0, [0.0])
 
     def preferred(answer, energy, best, best_energy):
-        return bool(is_better(answer, np.array([energy]), best, np.array([best_energy]))[0])
+        return bool(is_better(answer, np.array([energy]), best, np.array([best_energy]), gain=1e-6)[0])
 
     assert preferred(certified, 9.0, conflict, 1.0) and preferred(conflict, 9.0, none, 1.0)
     assert not preferred(conflict, 1.0, certified, 9.0) and not preferred(none, 1.0, conflict, 9.0)
