@@ -22,7 +22,9 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from studies.certificates import ends, placements
 from studies.certificates.coincidences import leaves_rotations_free, quick_builds
+from studies.certificates.pieces import convex_pieces
 from studies.certificates.polyhedra import Body, Polyhedron, separation
+from tests.cases import frames
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 BETTER = 1e-3  # share of the objective
@@ -33,7 +35,8 @@ FEASIBLE = 2e-7  # penetration that a pose may have
 ALLOWED = 5e-4  # penetration that is not contradicted by a certificate
 CLOSE = 4.0  # distance of pieces that get a plane; others are compared afterwards
 SPREAD = 0.05, 1.0  # rad and ranges of random starts
-MAX_PIECES = 60  # pairs of pieces with a plane
+MAX_PIECES = 500  # pairs of pieces with a plane
+MODELS = ("cells", "channel", "ra1", "ra2", "tower")
 NO_BETTER = "none better"
 STIFF, ALL, ACTIVE = "locator stiffness", "all points", "active points"
 ACTIVE_GAP, TOUCHING = 1e-9, 1e-6  # mm
@@ -76,6 +79,20 @@ def placed_scene(seed: int, objective: str) -> Scene:
     families = list(placements.FAMILIES)
     scene = placements.scene(seed, families[seed % len(families)], objective)
     return Scene(scene.assembly, scene.bodies, list(scene.pairs), min(scene.ranges))
+
+
+def model_scene(name: str) -> Scene:
+    """Return a model whose faces do not deviate."""
+    assembly = frames.model(name)
+    nominal = tc.build(assembly, solver="daqp", method=tc.Method()).nominal
+    sides = {tuple(nominal.part_index(face.part) for face in (pair.moving, pair.reference)) for pair in assembly.pairs}
+    meshes = [part.mesh.copy().apply_transform(homogeneous(*part.placement)) for part in nominal.parts]
+    return Scene(assembly, [convex_pieces(mesh) for mesh in meshes], sorted(sides), assembly.smallest_zone())
+
+
+def homogeneous(R: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Return the matrix (4, 4) of a rigid motion."""
+    return np.block([[R, t[:, None]], [np.zeros(3), 1.0]])
 
 
 def counted(program: tc.Program, objective: str, raw: Poses) -> list[Moments]:
@@ -305,10 +322,17 @@ def kind_of(row: dict) -> str:
     return NO_BETTER if row["best"] is not None else "no search ended"
 
 
+def scene_of(kind: str, seed: int, objective: str) -> Scene:
+    """Return a scene of a kind; of models, `seed` is the place in the list."""
+    if kind == "models":
+        return model_scene(MODELS[seed % len(MODELS)])
+    return placed_scene(seed, objective) if kind == "coincidences" else ends_scene(seed, kind == "whole")
+
+
 def main() -> int:
     """Judge scenes; return 1 if a better pose is near a resolved one."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--scenes-of", choices=("ends", "whole", "coincidences"), default="ends")
+    parser.add_argument("--scenes-of", choices=("ends", "whole", "coincidences", "models"), default="ends")
     parser.add_argument("--objective", choices=(ALL, ACTIVE, STIFF), default=ALL)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--scenes", type=int, default=300)
@@ -321,11 +345,7 @@ def main() -> int:
     began = time.perf_counter()
     for seed in range(options.first, options.first + options.scenes):
         try:
-            scene = (
-                placed_scene(seed, options.objective)
-                if options.scenes_of == "coincidences"
-                else ends_scene(seed, options.scenes_of == "whole")
-            )
+            scene = scene_of(options.scenes_of, seed, options.objective)
             with quick_builds():
                 rows = judged(
                     scene,

@@ -1,0 +1,71 @@
+"""What the search for places leaves out changes none: distant runs, and gaps above a ceiling."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import tolcontact as tc
+from studies.certificates.placements import FAMILIES, scene
+from tests.helpers import nightly
+from tests.units.geometry.test_outlines import between, plate
+from tolcontact.geometry.meeting import MAX_POINTS
+
+pytestmark = pytest.mark.filterwarnings("ignore::tolcontact.errors.NominalWarning")
+
+
+def without_shortcuts(meeting):
+    """A meeting whose candidates are all looked at, but for holes that are not reached (see test_outlines.py)."""
+    candidates = meeting.candidates
+    boxes = np.concatenate([np.full((len(meeting), 2), -np.inf), np.full((len(meeting), 2), np.inf)], axis=1)
+    everywhere = candidates._replace(boxes=boxes, widths=np.full(len(candidates.widths), np.inf))
+    return replace(meeting, candidates=everywhere)
+
+
+def poses(rng, count, shift, tilt):
+    R = Rotation.from_rotvec(rng.normal(0, tilt, (count, 3))).as_matrix().reshape(-1, 9)
+    return np.concatenate([R, rng.normal(0, shift, (count, 3))], axis=1)
+
+
+def assert_same_places(meeting, X):
+    """All places are equal; with a ceiling, those below it, or else the least gap."""
+    every = without_shortcuts(meeting).at(X)
+    for name, ours, theirs in zip(every._fields, meeting.at(X), every, strict=True):
+        assert np.array_equal(ours, theirs), name
+    for ceiling in (0.01, 0.2):
+        below = meeting.at(X, ceilings=np.full(len(X), ceiling))
+        for k in range(len(X)):
+            expected = set(every.labels[k][every.gaps[k] <= ceiling])
+            assert len(expected) == MAX_POINTS or expected <= set(below.labels[k])
+            assert below.gaps[k].min(initial=np.inf) == every.gaps[k].min(initial=np.inf)
+    return np.isfinite(every.gaps).any(axis=1).sum()
+
+
+@pytest.mark.parametrize("family", [2, 8, *nightly(*(family for family in range(len(FAMILIES)) if family not in (2, 8)))])
+def test_of_whole_bodies_with_coinciding_corners(family):
+    rng, found = np.random.default_rng(family), 0
+    for seed in range(7100 + family, 7100 + 8 * len(FAMILIES), len(FAMILIES)):
+        try:
+            placed = scene(seed, list(FAMILIES)[family], "all points")
+            program = tc.build(placed.assembly, solver="daqp", method=tc.Method())
+        except tc.ModelError:
+            continue
+        size = min(placed.ranges)
+        for meeting in program.meetings.values():
+            X = poses(rng, 60, size / 4, 0.005)
+            X = X[meeting.covers(X)]
+            if len(X):
+                found += assert_same_places(meeting, X) > len(X) // 2
+        if found >= 3:
+            break
+    assert found
+
+
+@pytest.mark.parametrize("seed", [0, 1, *nightly(*range(2, 6))])
+def test_of_plates_with_holes(seed):
+    rng = np.random.default_rng(seed)
+    meeting = between(plate(rng, up=True)[0], plate(rng, up=False)[0])
+    X = poses(rng, 150, 1.0, 0.005)
+    X[::2, 9:11] *= 10
+    assert assert_same_places(meeting, X) > 100
