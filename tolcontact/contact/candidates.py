@@ -192,7 +192,7 @@ class Candidates:
         if start.free:
             meeting = self._free[k] if kept is None else self._widened[k]
         elif start.sloped:
-            meeting = self._sloped[k]
+            meeting = meeting.sloped
         return bounded_scan(
             self._pairs[k], meeting, X_RM, deviations, kept,
             error=width * self._edge_error,
@@ -241,11 +241,6 @@ class Candidates:
     def _widened(self) -> dict[int, Meeting]:
         """The meetings of bounded pairs, of free bodies, with places that count slightly beyond their edges."""
         return {k: places.of_free_bodies(self._edge_error) for k, places in self.bounded.items()}
-
-    @cached_property
-    def _sloped(self) -> dict[int, Meeting]:
-        """The meetings of bounded pairs, with slopes where rims cross."""
-        return {k: places.with_slopes() for k, places in self.bounded.items()}
 
     def slants(self, state: State) -> Float[Array, " n"]:
         """Return the largest slant of rims under load that cross, in realizations (n,), see Meeting.slants."""

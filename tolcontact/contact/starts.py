@@ -25,7 +25,7 @@ class Start(NamedTuple):
     guarded      whether bodies that interfere where no place of contact shows it get such a place (see Guard)
     parted       whether convex bodies are separated only in the best direction (see Parting)
     free         whether bodies are moved apart first, and steps end before they enter each other (see FreeSteps)
-    sloped       whether rows of rims that cross have the slope of their gap (see Meeting.with_slopes)
+    sloped       whether rows of rims that cross have the slope of their gap (see Meeting.sloped)
     gain         share of the objective by which a certified answer must be better than another one
     """
 

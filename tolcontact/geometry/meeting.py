@@ -108,8 +108,9 @@ class Meeting:
         """Return the same candidates for bodies that are free; they count up to `overhang` [mm] outside their edges."""
         return replace(self, overhang=overhang, is_free=True)
 
-    def with_slopes(self) -> "Meeting":
-        """Return the same candidates; those where rims of facing planes cross have the slope of their gap as normals."""
+    @cached_property
+    def sloped(self) -> "Meeting":
+        """The same candidates; those where rims of facing planes cross have the slope of their gap as normals."""
         return replace(self, slant=1.0)
 
     def slants(self, X_RM: Float[Array, "n 12"], labels: Int[Array, " n"]) -> Float[Array, " n"]:
