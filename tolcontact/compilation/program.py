@@ -19,7 +19,7 @@ from tolcontact.compilation.solver import SolverChoice
 from tolcontact.compilation.solvers import solver_choice
 from tolcontact.compilation.station_program import StationProgram, station_programs
 from tolcontact.declaration.measure import Tape
-from tolcontact.discretization import ContactPoints, Nominal, RoundPoints, coordinates_in_words
+from tolcontact.discretization import ContactPoints, Nominal, coordinates_in_words
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.interference import Watch
 from tolcontact.limits import Limits
@@ -30,14 +30,14 @@ from tolcontact.mechanics.flexibility import (
     part_flexibilities,
     with_weights,
 )
-from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
-from tolcontact.mechanics.group_equations import face_heights, face_poses, facing_pose
+from tolcontact.mechanics.gap import GapMap
+from tolcontact.mechanics.group_equations import face_poses, facing_pose
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
+from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.placement import raw_poses
 from tolcontact.mechanics.pose import ENTRIES, poses_of
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
-from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.method import Method
 from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured
@@ -63,8 +63,8 @@ class Program(Pictured):
     draws        the draws of all contributors
     place        deviations (realization, contributor) -> poses (realization, 12 * part)
     observe      poses, deviations -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
-    gaps         gaps of each pair at X_RM, which are affine in it; None for round faces
-    round_gaps   X_RM, deviations -> gaps (realization, point), distances (realization, point) by pair index
+    gaps         gaps of each pair at X_RM, which are affine in it; None for other gaps
+    curved_gaps  by pair index, of other gaps: X_RM, deviations -> gaps (realization, point), distances (realization, point)
     meetings     by pair index: where its bodies can touch, if fixed planes do not represent its reference face
     trials       by pair index: the trial that decided this; none unless the search is bounded
     groups       the contact QPs
@@ -85,7 +85,7 @@ class Program(Pictured):
     place: NamedFunction
     observe: NamedFunction
     gaps: tuple[GapMap | None, ...]
-    round_gaps: dict[int, NamedFunction]
+    curved_gaps: dict[int, NamedFunction]
     meetings: dict[int, Meeting]
     trials: dict[int, Trial]
     groups: tuple[ContactGroup, ...]
@@ -169,7 +169,8 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             check_forces(nominal, groups)
         watch = _watch(nominal, draws, place)
         meetings, trials = bounded_pairs(watch, groups, draws, place, observe, method)
-        gaps = tuple(None if pair.round else gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs)
+        equations = [pair_gaps(pair) for pair in nominal.pairs]
+        gaps, functions = tuple(each.affine for each in equations), [each.function(nominal.input_count) for each in equations]
         rows = [_rows(pair, gaps[k], trials[k] if k in meetings else None, method) for k, pair in enumerate(nominal.pairs)]
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         standing = [[rows[k] for k in group.pairs] for group in groups]
@@ -178,7 +179,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         qps = []
         for group, points in zip(groups, standing, strict=True):
             flexibility = group_flexibility(nominal, group, list(map(row_count, points)), elastic)
-            qps.append((group, contact_qp(nominal, group, gaps, method, points, flexibility=flexibility)))
+            qps.append((group, contact_qp(nominal, group, method, points, flexibility=flexibility)))
         return Program(
             nominal=nominal,
             draws=draws,
@@ -187,7 +188,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             place=place,
             observe=observe,
             gaps=gaps,
-            round_gaps={k: _round_gaps(nominal, pair, pair.round) for k, pair in enumerate(nominal.pairs) if pair.round},
+            curved_gaps={k: NamedFunction.dense(found) for k, found in enumerate(functions) if found is not None},
             meetings=meetings,
             trials=trials,
             groups=tuple(ContactGroup(group, qp, ContactSolver(qp, choice)) for group, qp in qps),
@@ -227,15 +228,6 @@ def bent_measures(nominal: Nominal, entries: ca.SX, deviations: ca.SX, bending: 
     values = ca.vertcat(*measured(nominal, poses_of(entries), deviations, bending))
     inputs = {"poses": entries, "deviations": deviations, "loads": bending.loads}
     return NamedFunction.dense(ca.Function("observe_bent", [*inputs.values()], [values], [*inputs], ["measured"]))
-
-
-def _round_gaps(nominal: Nominal, pair: ContactPoints, points: RoundPoints) -> NamedFunction:
-    """Return the function of the gaps of round faces, see Program."""
-    X_RM, deviations = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("deviations", nominal.input_count)
-    results = round_gaps(points, X_RM, face_heights(pair, deviations), ca.SX(len(points), 1), ca.SX(ENTRIES, 0))
-    outputs = {"gaps": results.gaps, "distances": results.distances}
-    function = ca.Function("round_gaps", [X_RM, deviations], [*outputs.values()], ["X_RM", "deviations"], [*outputs])
-    return NamedFunction.dense(function)
 
 
 def _nominal_measures(nominal: Nominal, observe: NamedFunction) -> np.ndarray:

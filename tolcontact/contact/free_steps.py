@@ -9,6 +9,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.fixed_search import Search
 from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import min_gaps
 from tolcontact.contact.starts import FREE_WHERE_RAW, STRIDE
@@ -52,7 +53,8 @@ class FreeSteps:
         rows = np.flatnonzero(is_short)
         if rows.size:
             part, held = task.take(rows), state.take(rows)
-            scans = self._candidates.scans(held.relative, part.deviations, slots=held.slots, width=1.0, start=FREE_WHERE_RAW)
+            search = Search(FREE_WHERE_RAW, width=1.0)
+            scans = self._candidates.scans(held.relative, part.deviations, search, slots=held.slots)
             part = replace(part, raw=held.poses, relative=held.relative, scans=scans)
             freed = held.take(np.arange(len(rows)))
             size_of_rows, _ = step.take(part, freed, stride=STRIDE)
@@ -118,7 +120,7 @@ class FreeSteps:
 
     def _depths(self, task: Task, relative: np.ndarray, deepest: np.ndarray) -> np.ndarray:
         """Return the largest penetration (n,) [mm] of the places that are not deeper than `deepest` (n,) [mm]."""
-        scans = self._candidates.scans(relative, task.deviations, start=FREE_WHERE_RAW, deepest=deepest)
+        scans = self._candidates.scans(relative, task.deviations, Search(FREE_WHERE_RAW, deepest=deepest))
         return np.maximum(-min_gaps(scans, relative, task.deviations).min(axis=1), 0)
 
 

@@ -13,7 +13,6 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.compilation import NamedFunction
 from tolcontact.contact import kernel
 from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics import MOMENTS, GapMap
@@ -81,34 +80,6 @@ class Scan:
     def moves(self, points: Int[Array, "realization slot"]) -> Bool[Array, "realization slot"]:
         """Return which of `points` (realization, slot) are fixed to the moving body, so that their gaps are linear in X_RM."""
         return np.ones(points.shape, dtype=bool)
-
-
-@dataclass(frozen=True, eq=False)
-class RoundScan(Scan):
-    """The points of round faces, which follow from every pose. They always have a row of the QP; no row is searched for.
-
-    tables     moment tables (moment, point) of the sides that enter the objective
-    gaps_at    X_RM, deviations -> gaps (realization, point)
-    """
-
-    tables: tuple[Float[Array, "moment point"], ...]
-    gaps_at: NamedFunction
-
-    def gaps(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
-    ) -> Float[Array, "realization point"]:
-        """Return gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, contributor)."""
-        return self.gaps_at(X_RM=relative, deviations=deviations)["gaps"]
-
-    def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        return self.gaps(relative, deviations).min(axis=1)
-
-    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> Survey:
-        """Return number and moments of the points whose gap is below `activity` [mm]."""
-        active = self.gaps(relative, deviations) < activity
-        sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
-        moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
-        return Survey(active.sum(axis=1), moments)
 
 
 @dataclass(frozen=True, eq=False)

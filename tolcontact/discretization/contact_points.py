@@ -3,12 +3,14 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import trimesh
 
 from tolcontact.declaration import Assembly, ContactPair, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
+from tolcontact.discretization.fixed_contact import ContactPoints
 from tolcontact.discretization.form_points import (
     affordable_spacing,
     check_facing,
@@ -20,11 +22,9 @@ from tolcontact.discretization.form_points import (
     with_rims,
 )
 from tolcontact.discretization.locators import Locators, NominalPart
-from tolcontact.discretization.nominal import ContactPoints
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.retained_nodes import retained_nodes
-from tolcontact.discretization.round_contact import round_points
-from tolcontact.discretization.round_points import RoundPoints
+from tolcontact.discretization.round_contact import RoundContact
 from tolcontact.discretization.scenes import Scene
 from tolcontact.errors import GeometryFault
 from tolcontact.features import Features
@@ -39,8 +39,8 @@ from tolcontact.geometry.triangle_mesh import coordinate_error
 DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
 FORM_POINTS = 10_000  # with form, if that resolves it
-MIN_SHARE = 1e-3  # of the mean share of a point in the stiffness of a pair
 DEFAULT_SPRINGS = 40  # which may all be active at once, so that a QP has a row for each
+KINDS = (RoundContact,)  # of contact between faces, if the model leaves the choice open; other faces have fixed points
 
 
 def contact_points(
@@ -65,14 +65,23 @@ def contact_points(
         unplaced, moving_face = unplaced.part(triangles), moving_face.part(triangles)
         reference_face = reference_face.part(facing_triangles(reference_face, moving_face, deviating[0]))
         check_facing(moving_face, reference_face, deviating)
-    balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) and not lengths else []
-    # A hollow wall is fitted to many vertices: rounding hardly moves it.
-    is_rounded = not any(point.is_hollow for point in balls_and_shafts)
-    rounding = coordinate_error(moving.mesh) + coordinate_error(reference.mesh) if is_rounded else 0.0
-    undetected = None
-    if balls_and_shafts:
-        P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
-    else:
+    rounding = coordinate_error(moving.mesh) + coordinate_error(reference.mesh)
+    common: dict[str, Any] = {
+        "name": pair.name,
+        "moving": scene.index(moving.part),
+        "reference": scene.index(reference.part),
+        "reference_face": reference_face,
+        "moving_face": moving_face,
+        "within": reach,
+        "facets": facet_error(moving_face, reference_face, reach),
+        "deviating": deviating,
+        "elastic": _bends(pair),
+    }
+    points: ContactPoints | None = None
+    for kind in KINDS if _is_open(pair) and not lengths else ():
+        points = points or kind.between(moving_face, reference_face, reach, rounding, common)
+    if points is None:
+        undetected = None
         candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
         if candidates is None and _is_open(pair):
             candidates = retained_nodes((moving, reference), moving_face)
@@ -80,46 +89,16 @@ def contact_points(
             faces = moving_face, reference_face
             candidates, undetected = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths)
         P_m, P_r, n_r = _touching(pair, candidates, moving_face, reference_face, reach)
-    points = ContactPoints(
-        name=pair.name,
-        moving=scene.index(moving.part),
-        reference=scene.index(reference.part),
-        P_m=P_m,
-        P_r=P_r - rounding * n_r if rounding else P_r,
-        n_r=n_r,
-        offsets=Offsets.joined([], len(P_m)),
-        reference_face=reference_face,
-        moving_face=moving_face,
-        within=reach,
-        coordinate_error=rounding,
-        facets=facet_error(moving_face, reference_face, reach),
-        sampling_error=undetected,
-        round=RoundPoints.of(balls_and_shafts) if balls_and_shafts else None,
-        deviating=deviating,
-        elastic=_bends(pair),
-    )
-    if pair.stiffness is not None:
-        points = replace(points, stiffness=pair.stiffness * _spring_shares(points))
-    if balls_and_shafts or not any(deviating):
-        return points
-    return replace(points, offsets=height_offsets(points))
-
-
-def _spring_shares(points: ContactPoints) -> np.ndarray:
-    """Return the share (point,) of each contact point in the stiffness of its pair.
-
-    Raises GeometryFault for a curved face, which has no nominal area of contact.
-    """
-    assert points.moving_face is not None and points.reference_face is not None
-    if points.round is not None:
-        return np.where(points.round.points["axis"].any(axis=1), 0.5, 1.0)  # a shaft has two ends
-    if not (points.moving_face.is_flat and points.reference_face.is_flat):
-        raise GeometryFault("it has a stiffness, which needs flat faces, or a ball or shaft against walls; leave stiffness out")
-    shares = points.weights / len(points.P_m)
-    if shares.min() >= MIN_SHARE / len(shares):
-        return shares
-    shares = np.maximum(shares, MIN_SHARE / len(shares))  # a corner may represent no area
-    return shares / shares.sum()
+        points = ContactPoints(
+            P_m=P_m,
+            P_r=P_r - rounding * n_r if rounding else P_r,
+            n_r=n_r,
+            offsets=Offsets.joined([], len(P_m)),
+            coordinate_error=rounding,
+            sampling_error=undetected,
+            **common,
+        ).with_heights()
+    return points if pair.stiffness is None else replace(points, stiffness=pair.stiffness * points.stiffness_shares())
 
 
 def _bends(pair: ContactPair) -> bool:
@@ -196,17 +175,6 @@ def _touching(
         )
     _check_number(int(is_touching.sum()), "its faces have")
     return P_m[is_touching], P_r[is_touching], n_r[is_touching]
-
-
-def height_offsets(points: ContactPoints) -> Offsets:
-    """Return the heights of the points from sizes and forms; heights of the moving face count along the reference normal."""
-    offsets, facing = list[Offsets](), points.facing
-    for face, share, P in zip(points.deviating, (facing, np.ones_like(facing)), (points.P_m, points.P_r), strict=True):
-        if face is not None and face.grows:
-            offsets.append(Offsets(face.columns[face.height != 0], np.outer(face.height[face.height != 0], share)))
-        if face is not None and face.form is not None:
-            offsets.append(Offsets(face.form_columns, face.form.heights(P).T * share))
-    return Offsets.joined(offsets, len(facing))
 
 
 def _check_number(points: float, subject: str) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.discretization.nominal import ContactPoints
+from tolcontact.discretization.fixed_contact import ContactPoints
+from tolcontact.discretization.offsets import PairForm
 from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry import region_kernel
 from tolcontact.geometry.meeting import NEARNESS, Meeting
@@ -38,15 +39,16 @@ def raised_places(
     gaps between faces that have grown; with form they do not count.
     """
     grown = pair.heights(deviations)[:, None]
-    if not pair.has_form:
+    form = pair.form(deviations)
+    if form is None:
         places = meeting.at(X_RM, retained, error, nearness, None if ceilings is None else ceilings + grown[:, 0])
         return RaisedPlaces(places, np.broadcast_to(grown, places.gaps.shape))
     at_ends = None if retained is None else np.where(retained < FIRST_POINT, retained, -1)
     ends = meeting.at(X_RM, at_ends, error, nearness)
     row, place = np.nonzero(np.isfinite(ends.gaps))
     heights = np.zeros(ends.gaps.shape)
-    heights[row, place] = pair.form(deviations).at(row, ends.P_m[row, place], ends.P_r[row, place])
-    raised = RaisedPlaces(ends, heights).followed_by(*_points(pair, X_RM, deviations, retained, depth))
+    heights[row, place] = form.at(row, ends.P_m[row, place], ends.P_r[row, place])
+    raised = RaisedPlaces(ends, heights).followed_by(*_points(pair, form, X_RM, deviations, retained, depth))
     return raised._replace(heights=grown + raised.heights)
 
 
@@ -64,7 +66,7 @@ def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> tuple[Float[A
 
 
 def _points(
-    pair: ContactPoints, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None, depth: float
+    pair: ContactPoints, form: PairForm, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None, depth: float
 ) -> tuple[RaisedPlaces, RaisedPlaces]:
     """Return points inside the rims of the faces as candidates, and minima of the gap between them, with the forms there.
 
@@ -118,7 +120,7 @@ def _points(
     row, place = _exact(gaps - heights, minima.bulge(deviations))
     moved = pose.apply(poses[row], P_m[row, place, None])[:, 0]
     true_feet = moved - ((moved - P_r[row, place]) @ pair.n_r[0])[:, None] * pair.n_r[0]
-    heights[row, place] = pair.form(deviations).at(row, P_m[row, place], true_feet)
+    heights[row, place] = form.at(row, P_m[row, place], true_feet)
     return RaisedPlaces(Places(labels, gaps, P_m, P_r, n_r), heights), minima.at(poses, deviations, between)
 
 

@@ -1,13 +1,22 @@
-"""Contact of round faces: a ball or shaft of one part against walls of the other. Nominal assembly frame, mm."""
+"""Contact of round faces: a ball or shaft of one part against walls of the other. Nominal assembly frame, mm.
+
+Its gaps are in mechanics/round_gap, and its search in contact/round_search.
+"""
 
 import itertools
 import math
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import trimesh
 
-from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, RoundPoint, arc, tangent_directions
+from tolcontact.arrays import Array, Bool, Float
+from tolcontact.discretization.fixed_contact import ContactPoints
+from tolcontact.discretization.offsets import Offsets
+from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, RoundPoint, RoundPoints, arc, tangent_directions
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, RoundSurface, Sphere
 from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.geometry.tolerances import PARALLEL, SAME_PLACE
@@ -19,6 +28,94 @@ AXIS_PLACES = 200  # places along an axis that are examined
 BISECTIONS = 40
 MAX_FACET_SINE = 0.3  # of half the angle between facets
 NORMAL_TOLERANCE = 1e-7  # between the normals of neighbouring triangles of one plane
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RoundContact(ContactPoints):
+    """Contact of balls and shafts with walls, whose gaps are known at any pose.
+
+    round   the balls and shafts, and their walls; P^m, P^r, n^r are their nominal contact points
+    """
+
+    samples_faces: ClassVar[bool] = False
+    _accuracy_in_words: ClassVar[str] = ", exact on round faces"
+
+    round: RoundPoints
+
+    @classmethod
+    def between(
+        cls, moving: Surface, reference: Surface, reach: float, rounding: float, common: Mapping[str, Any]
+    ) -> Self | None:
+        """Return the contact of two faces; None if they may touch otherwise than as balls or shafts and walls.
+
+        reach      [mm]: walls at a larger distance have no points
+        rounding   [mm]: coordinate error of both bodies
+        common     the other fields
+        """
+        points = round_points(moving, reference, reach)
+        if not points:
+            return None
+        if any(point.is_hollow for point in points):
+            rounding = 0.0  # a hollow wall is fitted to many vertices: rounding hardly moves it
+        P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in points), strict=True))
+        return cls(
+            P_m=P_m,
+            P_r=P_r - rounding * n_r if rounding else P_r,
+            n_r=n_r,
+            offsets=Offsets.joined([], len(P_m)),
+            coordinate_error=rounding,
+            round=RoundPoints.of(points),
+            **common,
+        )
+
+    @cached_property
+    def facing(self) -> np.ndarray:
+        return np.ones(len(self.P_m))
+
+    @property
+    def counts_centres(self) -> bool:
+        return self.round.are_beside
+
+    def counted(self, *, of_moving: bool) -> tuple[Float[Array, "point 3"], Float[Array, " point"]]:
+        """Return the centres of round faces: a point on one would leave its part free to roll.
+
+        It could then move aside at no cost until it is clear. In a hollow wall the tangent planes have contact points on all
+        sides, which is as good. An end of a shaft's axis has no radius, since the other end holds the shaft.
+        """
+        if not self.counts_centres:
+            return super().counted(of_moving=of_moving)
+        centres, radii = zip(*(point.curvature(of_moving=of_moving) for point in self.round), strict=True)
+        is_end = self.round.points["axis"].any(axis=1) & (self.round.points["on_moving"] == of_moving)
+        return np.array(centres), np.where(is_end, 0.0, radii)
+
+    @property
+    def shapes(self) -> tuple[Mapping[str, np.ndarray], Mapping[str, np.ndarray]]:
+        return self.round.walls, self.round.points
+
+    @property
+    def stays(self) -> Bool[Array, " point"]:
+        return ~self.round.points["is_hollow"]
+
+    def without(self, held: np.ndarray, distance: float) -> Self:
+        return self
+
+    def stiffness_shares(self) -> np.ndarray:
+        return np.where(self.round.points["axis"].any(axis=1), 0.5, 1.0)  # a shaft has two ends
+
+    def raw_depth(self, X_RM: np.ndarray, deviations: np.ndarray) -> float:
+        return self.travel(X_RM)
+
+    @property
+    def curvature(self) -> float:
+        return 0.0
+
+    @property
+    def may_miss_ends(self) -> bool:
+        return False
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        return np.ones(len(self.P_m))
 
 
 def round_points(moving: Surface, reference: Surface, reach: float) -> list[RoundPoint]:

@@ -111,11 +111,15 @@ class GroupEquations:
         centres = [poses[k].apply(constant(mobilities[k].centre)) for k in map(self.group.position, self.group.free)]
         return Motion(mobilities, poses, increments(self.z, self.group.length, centres))
 
+    def pair(self, k: int) -> ContactPoints:
+        """Return a pair, given by its position in the group."""
+        return self.nominal.pairs[self.group.pairs[k]]
+
     def relative(self, poses: Sequence[Pose]) -> list[Pose]:
         """Return X_RM of the faces of each pair of the group."""
         relative_poses = []
-        for index, faces in zip(self.group.pairs, self.faces, strict=True):
-            pair = self.nominal.pairs[index]
+        for k, faces in enumerate(self.faces):
+            pair = self.pair(k)
             reference = None if pair.reference is None else poses[self.group.position(pair.reference)]
             relative_poses.append(facing_pose(faces, poses[self.group.position(pair.moving)], reference))
         return relative_poses

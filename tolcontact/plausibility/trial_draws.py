@@ -9,6 +9,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, push
+from tolcontact.contact import pair_search
 from tolcontact.interference import Clash
 from tolcontact.simulation import Block, simulate_block
 
@@ -49,19 +50,11 @@ class TrialDraws:
 
     def nominal_gaps(self, k: int) -> Float[Array, " point"]:
         """Return the gaps (point,) [mm] of pair k in the nominal assembly."""
-        return self._gaps(k, pose.AT_REST[None], np.zeros((1, self.deviations.shape[1])))[0]
+        return pair_search(self.program, k).gaps(pose.AT_REST[None], np.zeros((1, self.deviations.shape[1])))[0]
 
     def gaps(self, k: int, points: np.ndarray) -> Float[Array, "n point"]:
         """Return the gaps (draw, point) [mm] of some points of pair k."""
-        return self._gaps(k, self.relative[:, k], self.deviations, points)
-
-    def _gaps(self, k: int, X_RM: np.ndarray, deviations: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
-        pair = self.program.nominal.pairs[k]
-        chosen_points = np.arange(len(pair.P_m)) if points is None else points
-        if pair.round is not None:
-            return np.asarray(self.program.round_gaps[k](X_RM=X_RM, deviations=deviations)["gaps"])[:, chosen_points]
-        gaps = pair.nominal_gaps(X_RM, chosen_points) - pair.heights(deviations)[:, None]
-        return gaps - pair.form_heights(deviations, chosen_points)
+        return pair_search(self.program, k).gaps(self.relative[:, k], self.deviations, points)
 
     @cached_property
     def clashes(self) -> list[Clash]:

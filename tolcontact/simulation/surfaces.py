@@ -50,9 +50,9 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
         if faces is None or pair.reference is None or pair.is_springy:  # compliant faces may penetrate
             continue
         X_RM, heights = relative[:, k], pair.heights(deviations)
-        form = pair.form(deviations) if pair.has_form else None
+        form = pair.form(deviations)
         surfaces.penetration[:, k] = faces.depth(X_RM, heights, form)
-        if not pair.round and k not in program.meetings:  # otherwise contact points project onto the face
+        if pair.samples_faces and k not in program.meetings:  # otherwise contact points project onto the face
             points = pose.apply(X_RM, pair.P_m)
             gaps = pair.nominal_gaps(X_RM)
             raised = heights[:, None] if form is None else heights[:, None] + pair.form_heights(deviations)

@@ -98,7 +98,7 @@ def plain(program):
     """The same program without accelerators."""
     choice, groups = OneByOne("one by one", fallbacks=("qpoases",)), []
     for group in program.groups:
-        qp = contact_qp(program.nominal, group.group, program.gaps, program.method, group.qp.standing, inline)
+        qp = contact_qp(program.nominal, group.group, program.method, group.qp.standing, inline)
         qp = PlainQP(**vars(qp))
         groups.append(ContactGroup(group.group, qp, ContactSolver(qp, choice)))
     return replace(
@@ -106,7 +106,7 @@ def plain(program):
         solver=choice,
         place=Interpreted(program.place.function),
         observe=Interpreted(program.observe.function),
-        round_gaps={k: Interpreted(function.function) for k, function in program.round_gaps.items()},
+        curved_gaps={k: Interpreted(function.function) for k, function in program.curved_gaps.items()},
         groups=tuple(groups),
     )
 
