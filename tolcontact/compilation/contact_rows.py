@@ -3,13 +3,13 @@
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics.flexibility import Flexibility
-from tolcontact.mechanics.gap import GapMap
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.pair_gaps import Point, RowPoints, pair_gaps
 from tolcontact.mechanics.pose import ENTRIES, Pose
@@ -72,13 +72,13 @@ def springs_of(compliance: ca.SX) -> list[int]:
     return [k for k in range(compliance.numel()) if not compliance[k].is_zero()]
 
 
-def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) -> np.ndarray | int:
+def standing_points(pair: ContactPoints, gaps: Any, method: Method) -> np.ndarray | int:
     """Return the points of a pair that always have a row, or the number of its slots for changing points.
 
-    Points whose gaps are not affine always have a row. The same holds for points that can be the deepest, if they are few and
+    Points that follow from every pose always have a row. The same holds for points that can be the deepest, if they are few and
     fixed.
     """
-    if gaps is None or pair.is_springy:
+    if not pair.samples_faces or pair.is_springy:
         return np.arange(len(pair.P_m))
     are_few = method.is_closed and len(gaps.corners) <= MANY_SLOTS and pair.minima is None
     return gaps.corners if are_few else MANY_SLOTS
@@ -107,7 +107,7 @@ def contact_rows(
         compliance.append(points.compliance)
         slopes.append(rows.slopes)
         gaps.append(rows.gaps)
-        filled.append(rows.filled)
+        filled.append(ca.vertcat(*(is_filled for *_, is_filled in points.points)) if points.points else ca.SX.ones(count))
         bends.append(rows.bends)
         curvature += rows.curvature
         hollow_curvature += rows.hollow_curvature

@@ -4,6 +4,7 @@ import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -30,7 +31,6 @@ from tolcontact.mechanics.flexibility import (
     part_flexibilities,
     with_weights,
 )
-from tolcontact.mechanics.gap import GapMap
 from tolcontact.mechanics.group_equations import face_poses, facing_pose
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
@@ -63,8 +63,8 @@ class Program(Pictured):
     draws        the draws of all contributors
     place        deviations (realization, contributor) -> poses (realization, 12 * part)
     observe      poses, deviations -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
-    gaps         gaps of each pair at X_RM, which are affine in it; None for other gaps
-    curved_gaps  by pair index, of other gaps: X_RM, deviations -> gaps (realization, point), distances (realization, point)
+    gaps         gaps of each pair at X_RM: a GapMap, or of points that follow from every pose the function
+                 X_RM, deviations -> gaps (realization, point), distances (realization, point)
     meetings     by pair index: where its bodies can touch, if fixed planes do not represent its reference face
     trials       by pair index: the trial that decided this; none unless the search is bounded
     groups       the contact QPs
@@ -84,8 +84,7 @@ class Program(Pictured):
     solver: SolverChoice
     place: NamedFunction
     observe: NamedFunction
-    gaps: tuple[GapMap | None, ...]
-    curved_gaps: dict[int, NamedFunction]
+    gaps: tuple[Any, ...]
     meetings: dict[int, Meeting]
     trials: dict[int, Trial]
     groups: tuple[ContactGroup, ...]
@@ -169,8 +168,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             check_forces(nominal, groups)
         watch = _watch(nominal, draws, place)
         meetings, trials = bounded_pairs(watch, groups, draws, place, observe, method)
-        equations = [pair_gaps(pair) for pair in nominal.pairs]
-        gaps, functions = tuple(each.affine for each in equations), [each.function(nominal.input_count) for each in equations]
+        gaps = [pair_gaps(pair).compiled(nominal.input_count) for pair in nominal.pairs]
         rows = [_rows(pair, gaps[k], trials[k] if k in meetings else None, method) for k, pair in enumerate(nominal.pairs)]
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         standing = [[rows[k] for k in group.pairs] for group in groups]
@@ -187,8 +185,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             solver=choice,
             place=place,
             observe=observe,
-            gaps=gaps,
-            curved_gaps={k: NamedFunction.dense(found) for k, found in enumerate(functions) if found is not None},
+            gaps=tuple(NamedFunction.dense(of_pair) if isinstance(of_pair, ca.Function) else of_pair for of_pair in gaps),
             meetings=meetings,
             trials=trials,
             groups=tuple(ContactGroup(group, qp, ContactSolver(qp, choice)) for group, qp in qps),
@@ -241,7 +238,7 @@ def _watch(nominal: Nominal, draws: Draws, place: NamedFunction) -> Watch:
     return Watch(nominal, {}, poses, deviations)
 
 
-def _rows(pair: ContactPoints, gaps: GapMap | None, trial: Trial | None, method: Method) -> np.ndarray | int:
+def _rows(pair: ContactPoints, gaps: Any, trial: Trial | None, method: Method) -> np.ndarray | int:
     """Return the points of a pair that always have a row, or the number of its slots; with the trial of a pair with a meeting.
 
     The contact points of a pair with a meeting change with every pose, so that none of them always has a row.

@@ -93,7 +93,6 @@ class FixedSearch:
     ) -> Int[Array, " point"]:
         """Return the number of poses (point,) at which the gap of a contact point is below `limit` [mm]."""
         gaps, counts = self.program.gaps[self.index], np.zeros(len(self.pair.P_m), dtype=np.int64)
-        assert gaps is not None
         kernel.count_below(gaps.basis, gaps.columns, gaps.coordinates, X_RM, deviations, limit, counts)
         return counts
 
@@ -113,15 +112,13 @@ class FixedSearch:
     @cached_property
     def _all_points(self) -> FixedScan:
         """The scan of all contact points."""
-        gaps = self.program.gaps[self.index]
-        assert gaps is not None
-        return pair_scan(self.pair, gaps, self._tables, self.clusters)
+        return pair_scan(self.pair, self.program.gaps[self.index], self._tables, self.clusters)
 
     @cached_property
     def fixed(self) -> FixedScan:
         """The scan of the points that may be active. If the paper's set may be, points between the corners count, too."""
         gaps = self.program.gaps[self.index]
-        return pair_scan(self.pair, gaps, (), self.clusters, gaps.corners) if self.is_closed and gaps else self._all_points
+        return pair_scan(self.pair, gaps, (), self.clusters, gaps.corners) if self.is_closed else self._all_points
 
     def scan(
         self,
@@ -148,7 +145,7 @@ class FixedSearch:
 
     def projected(self, X_RM: Float[Array, "n 12"]) -> Scan:
         """Return a scan of the points, projected again at X_RM."""
-        return project(self.fixed, self.pair, X_RM, self._margin)
+        return project(self.fixed, X_RM, self._margin)
 
     @cached_property
     def _margin(self) -> float:
@@ -175,5 +172,5 @@ class FixedSearch:
     def _places(self, labels: Int[Array, " point"]) -> Float[Array, "point 3"]:
         """Return the nominal places of contact points, and of minima of the gap between them, by their labels."""
         is_point, minima = labels < FIRST_PLACE, self.pair.minima
-        places = self.fixed.P_m[np.where(is_point, labels, 0)]
+        places = self.fixed.pair.P_m[np.where(is_point, labels, 0)]
         return places if minima is None else np.where(is_point[:, None], places, minima.points(labels))

@@ -23,7 +23,7 @@ class RoundSearch(FixedSearch, Scan):
 
     def __init__(self, program: Program, index: int, tables: Sequence[np.ndarray] = ()) -> None:
         super().__init__(program, index, tables)
-        self._at = program.curved_gaps[index]
+        self._at = program.gaps[index]
 
     def gaps(self, X_RM: np.ndarray, deviations: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
         gaps = self._at(X_RM=X_RM, deviations=deviations)["gaps"]

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Bool, Float
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.discretization.form_points import COVER_SHARE, form_lengths, form_spacing
 from tolcontact.discretization.offsets import Offsets, PairForm
 from tolcontact.discretization.plane_minima import PlaneMinima
@@ -110,6 +110,12 @@ class ContactPoints:
         """Whether a contact point (point,) has its nominal place at any pose."""
         return np.ones(len(self.P_m), dtype=bool)
 
+    def take(self, points: Int[Array, " point"]) -> Self:
+        """Return the pair with some of its points, in this order."""
+        arrays = {name: getattr(self, name) for name in ("P_m", "P_r", "n_r", "locators", "stiffness", "pulls")}
+        arrays = {name: values[points] for name, values in arrays.items() if values is not None}
+        return replace(self, **arrays, offsets=self.offsets.take(points))
+
     def without(self, held: Float[Array, "place 3"], distance: float) -> Self:
         """Return the pair without its points up to a `distance` [mm] from places that are held.
 
@@ -122,9 +128,7 @@ class ContactPoints:
             raise GeometryFault(
                 "guns or welds hold its parts at all its contact points; leave the pair out, or give more points"
             )
-        stiffness = None if self.stiffness is None else self.stiffness[free]
-        points = {name: getattr(self, name)[free] for name in ("P_m", "P_r", "n_r")}
-        return replace(self, **points, offsets=self.offsets.take(free), stiffness=stiffness)
+        return self.take(free)
 
     def with_heights(self) -> Self:
         """Return the pair with offsets by sizes and forms; heights of the moving face count along the reference normal."""

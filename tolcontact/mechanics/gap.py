@@ -8,6 +8,7 @@ at any pose.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -15,6 +16,26 @@ from scipy.spatial import ConvexHull, QhullError
 
 from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
+
+
+class GapTerms(NamedTuple):
+    """The gaps of a pair's points at X_RM, and their derivatives by the increments z.
+
+    gaps              (point, 1) [mm]; where two tangents of a hollow wall nearly agree, both have the gap of the nearer one
+    slopes            (point, z): derivatives of the gaps by z
+    bends             (12, 1): sum of reaction times gap derivative by X_RM
+    curvature         (z, z): sum of reaction times second gap derivative, for X_RM linear in z, without `hollow_curvature`
+    hollow_curvature  (z, z): the part of that sum due to bodies sliding along hollow walls; positive semidefinite, and to be
+                      subtracted from `curvature`
+    distances         (point, 1) [mm]: the gap of each point, without regard to other tangents
+    """
+
+    gaps: ca.SX
+    slopes: ca.SX
+    bends: ca.SX
+    curvature: ca.SX
+    hollow_curvature: ca.SX
+    distances: ca.SX
 
 
 def gap(X_RM: Pose, P_m: ca.SX, P_r: ca.SX, n_r: ca.SX) -> ca.SX:

@@ -10,10 +10,10 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import ContactPoints, RoundContact
-from tolcontact.mechanics.gap import GapMap, gap, gap_map, gap_matrix
+from tolcontact.mechanics.gap import GapMap, GapTerms, gap, gap_map, gap_matrix
 from tolcontact.mechanics.group_equations import face_heights
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
-from tolcontact.mechanics.round_gap import RoundGaps, round_gaps
+from tolcontact.mechanics.round_gap import round_gaps
 
 Point = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # P^m, P^r, n^r, and 1 if it has a row
 
@@ -32,21 +32,6 @@ class RowPoints(NamedTuple):
     bend: ca.SX | None = None
 
 
-class PairRows(NamedTuple):
-    """The rows of a pair about a pose X_RM: slopes (row, z), gaps (row, 1) [mm] and filled (row, 1), see Rows.
-
-    bends                         (12, 1), see Rows
-    curvature, hollow_curvature   (z, z), see RoundGaps; empty for gaps that are affine in X_RM
-    """
-
-    slopes: ca.SX
-    gaps: ca.SX
-    filled: ca.SX
-    bends: ca.SX
-    curvature: ca.SX
-    hollow_curvature: ca.SX
-
-
 class FixedGaps:
     """Gaps of fixed points over fixed tangent planes, paper (5): affine in X_RM.
 
@@ -57,14 +42,9 @@ class FixedGaps:
         self._pair = pair
         self.key: tuple[bytes, ...] = ()
 
-    @property
-    def affine(self) -> GapMap | None:
-        """All gaps as affine functions; None if they are not."""
+    def compiled(self, inputs: int) -> GapMap | ca.Function:
+        """Return all gaps at X_RM, for a number of `inputs` of a realization."""
         return gap_map(gap_matrix(self._pair), self._pair.offsets)
-
-    def function(self, inputs: int) -> ca.Function | None:
-        """Return the Function of all gaps, for a number of `inputs` of a realization; None if they are affine."""
-        return None
 
     def points(self, chosen: np.ndarray, deviations: ca.SX) -> list[Point]:
         """Return points that always have a row: constants, except for the offsets that depend on deviations."""
@@ -80,9 +60,9 @@ class FixedGaps:
         """Return the gaps of the rows at a pose, for the growth (2, 1) [mm] of both faces."""
         return [gap(X_RM, P_m, P_r, n_r) for P_m, P_r, n_r, _ in points.points]
 
-    def rows(self, X_RM: Pose, by_z: ca.SX, heights: ca.SX, points: RowPoints, reactions: ca.SX) -> PairRows:
-        """Return the rows about X_RM, whose derivatives by the increments are `by_z` (12, z), see contact_rows."""
-        slopes, gaps, flat = [], [], ca.SX(by_z.size2(), by_z.size2())
+    def rows(self, X_RM: Pose, by_z: ca.SX, heights: ca.SX, points: RowPoints, reactions: ca.SX) -> GapTerms:
+        """Return the gaps of the rows about X_RM, whose derivatives by the increments are `by_z` (12, z), see contact_rows."""
+        slopes, gaps = [], []
         bends = ca.SX.zeros(ENTRIES) if points.bend is None else points.bend
         for row, (P_m, P_r, n_r, _) in enumerate(points.points):
             X = ca.SX.sym("X_RM", ENTRIES)
@@ -92,9 +72,8 @@ class FixedGaps:
                 bends += gradient.T * reactions[row]
             slopes.append(gradient @ by_z)
             gaps.append(ca.substitute(g, X, X_RM.vector()))
-        filled = [is_filled for *_, is_filled in points.points]
-        all_gaps, all_filled = (ca.vertcat(ca.SX(0, 1), *values) for values in (gaps, filled))
-        return PairRows(ca.vertcat(ca.SX(0, by_z.size2()), *slopes), all_gaps, all_filled, bends, flat, flat)
+        flat, all_gaps = ca.SX(by_z.size2(), by_z.size2()), ca.vertcat(ca.SX(0, 1), *gaps)
+        return GapTerms(all_gaps, ca.vertcat(ca.SX(0, by_z.size2()), *slopes), bends, flat, flat, all_gaps)
 
 
 class CurvedGaps(FixedGaps):
@@ -104,15 +83,11 @@ class CurvedGaps(FixedGaps):
         self._pair, self._round = pair, pair.round
         self.key = pair.round.fingerprint
 
-    @property
-    def affine(self) -> GapMap | None:
-        return None
-
-    def function(self, inputs: int) -> ca.Function | None:
-        """Return the Function X_RM, deviations -> gaps and distances (point, 1) [mm], see RoundGaps."""
+    def compiled(self, inputs: int) -> GapMap | ca.Function:
+        """Return the Function X_RM, deviations -> gaps and distances (point, 1) [mm], see GapTerms."""
         X_RM, deviations = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("deviations", inputs)
-        results = self._at(X_RM, face_heights(self._pair, deviations))
-        outputs = {"gaps": results.gaps, "distances": results.distances}
+        terms = self._at(X_RM, face_heights(self._pair, deviations))
+        outputs = {"gaps": terms.gaps, "distances": terms.distances}
         return ca.Function("round_gaps", [X_RM, deviations], [*outputs.values()], ["X_RM", "deviations"], [*outputs])
 
     def points(self, chosen: np.ndarray, deviations: ca.SX) -> list[Point]:
@@ -121,15 +96,14 @@ class CurvedGaps(FixedGaps):
     def values(self, X_RM: Pose, heights: ca.SX, points: RowPoints) -> Sequence[ca.SX]:
         return ca.vertsplit(self._at(X_RM.vector(), heights).gaps)
 
-    def rows(self, X_RM: Pose, by_z: ca.SX, heights: ca.SX, points: RowPoints, reactions: ca.SX) -> PairRows:
+    def rows(self, X_RM: Pose, by_z: ca.SX, heights: ca.SX, points: RowPoints, reactions: ca.SX) -> GapTerms:
         z, count = sorted(set(by_z.sparsity().get_triplet()[1])), by_z.size2()  # increments of the two parts of the pair
-        found = round_gaps(self._round, X_RM.vector(), heights, reactions, by_z[:, z])
+        terms = round_gaps(self._round, X_RM.vector(), heights, reactions, by_z[:, z])
         slopes, curvature, hollow_curvature = (ca.SX(rows, count) for rows in (len(self._round), count, count))
-        slopes[:, z], curvature[z, z], hollow_curvature[z, z] = found.slopes, found.curvature, found.hollow_curvature
-        filled = ca.SX.ones(len(self._round))
-        return PairRows(slopes, found.gaps, filled, found.bends, curvature, hollow_curvature)
+        slopes[:, z], curvature[z, z], hollow_curvature[z, z] = terms.slopes, terms.curvature, terms.hollow_curvature
+        return terms._replace(slopes=slopes, curvature=curvature, hollow_curvature=hollow_curvature)
 
-    def _at(self, X_RM: ca.SX, heights: ca.SX) -> RoundGaps:
+    def _at(self, X_RM: ca.SX, heights: ca.SX) -> GapTerms:
         return round_gaps(self._round, X_RM, heights, ca.SX(len(self._round), 1), ca.SX(ENTRIES, 0))
 
 

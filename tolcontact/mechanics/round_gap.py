@@ -2,12 +2,12 @@
 
 import functools
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import RoundPoint, RoundPoints
+from tolcontact.mechanics.gap import GapTerms
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 from tolcontact.mechanics.round_terms import Terms, round_terms
 from tolcontact.mechanics.symmetric_products import congruent
@@ -17,27 +17,7 @@ ROUNDING = 1e-14  # of the distance from the origin: error of a point that is co
 TANGENT_TOLERANCE = 0.05  # rad: tangents within this angle count as one
 
 
-class RoundGaps(NamedTuple):
-    """The gaps of round points at X_RM, and their derivatives by the increments z.
-
-    gaps              (point, 1) [mm]; where two tangents nearly agree, both have the gap of the nearer one
-    slopes            (point, z): derivatives of the gaps by z
-    bends             (12, 1): sum of reaction times gap derivative by X_RM
-    curvature         (z, z): sum of reaction times second gap derivative, for X_RM linear in z, without `hollow_curvature`
-    hollow_curvature  (z, z): the part of that sum due to bodies sliding along hollow walls; positive semidefinite, and to be
-                      subtracted from `curvature`
-    distances         (point, 1) [mm]: the gap of each point, without regard to other tangents
-    """
-
-    gaps: ca.SX
-    slopes: ca.SX
-    bends: ca.SX
-    curvature: ca.SX
-    hollow_curvature: ca.SX
-    distances: ca.SX
-
-
-def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.SX, by_z: ca.SX) -> RoundGaps:
+def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.SX, by_z: ca.SX) -> GapTerms:
     """Return the gaps of round points.
 
     X_RM       (12, 1)
@@ -74,7 +54,7 @@ def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.S
         for (body, terms), load in zip(terms_of_points, loads, strict=True):
             body.add(terms, load)
     freedoms = by_z.size2()
-    return RoundGaps(
+    return GapTerms(
         gaps=ca.vertcat(*gaps),
         slopes=ca.vertcat(*slopes),
         bends=sum((body.bends() for body in bodies), ca.SX(ENTRIES, 1)),

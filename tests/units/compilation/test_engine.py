@@ -44,7 +44,7 @@ def test_compiled_functions_equal_interpreted_ones_to_the_last_bit(name, method)
     nominal = discretize(PLANAR[name]())
     for group in contact_groups(nominal, method):
         pairs = [nominal.pairs[index] for index in group.pairs]
-        standing = [contact_rows.standing_points(pair, pair_gaps(pair).affine, method) for pair in pairs]
+        standing = [contact_rows.standing_points(pair, pair_gaps(pair).compiled(nominal.input_count), method) for pair in pairs]
         qp = contact_qp.contact_qp(nominal, group, method, standing)
         for function in (qp.assemble, qp.finish):
             inputs = [RNG.normal(size=(7, function.nnz_in(k))) for k in range(function.n_in())]
