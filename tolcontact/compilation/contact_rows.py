@@ -10,8 +10,9 @@ import numpy as np
 
 from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics.flexibility import Flexibility
+from tolcontact.mechanics.gap import Point, RowPoints
 from tolcontact.mechanics.group_equations import GroupEquations
-from tolcontact.mechanics.pair_gaps import Point, RowPoints, pair_gaps
+from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.pose import ENTRIES, Pose
 from tolcontact.method import Method
 

@@ -17,10 +17,11 @@ from tolcontact.compilation.contact_rows import Rows, contact_rows, relative_pos
 from tolcontact.compilation.quadratic_terms import QuadraticTerms, quadratic_terms
 from tolcontact.mechanics.correction import FREEDOMS, Motion, linear
 from tolcontact.mechanics.displacement import MOMENTS
+from tolcontact.mechanics.gap import RowPoints
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.groups import Group
 from tolcontact.mechanics.objective import objective_scale
-from tolcontact.mechanics.pair_gaps import RowPoints, pair_gaps
+from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.pose import Pose, poses_of
 from tolcontact.method import Method
 

@@ -147,13 +147,15 @@ class Candidates:
     ) -> RawSurvey:
         """Return the survey of raw states, for deviations (realization, contributor)."""
         scans = self.scans(relative, deviations)
-        surveys = [pair.survey(relative[:, k], deviations, ACTIVE_GAP) for k, pair in enumerate(self.pairs)]
+        active, moments = zip(
+            *(pair.survey(relative[:, k], deviations, ACTIVE_GAP) for k, pair in enumerate(self.pairs)), strict=True
+        )
         return RawSurvey(
             scans=scans,
             min_gap=min_gaps(scans, relative, deviations),
             is_inside=np.stack([scan.depth_between(relative[:, k]) for k, scan in enumerate(scans)]).max(axis=0) > 0,
-            active=np.stack([survey.active for survey in surveys], axis=1),
-            moments=np.concatenate([self._counted(k, survey.moments) for k, survey in enumerate(surveys)], axis=1),
+            active=np.stack(active, axis=1),
+            moments=np.concatenate([self._counted(k, of_active) for k, of_active in enumerate(moments)], axis=1),
         )
 
     def _counted(self, k: int, active: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from tolcontact.compilation import Program
 from tolcontact.contact import kernel
 from tolcontact.contact.projected_scan import half_spacing, project
 from tolcontact.contact.raised_scan import RaisedScan, raised_scan
-from tolcontact.contact.scan import FixedScan, Scan, Survey, pair_scan
+from tolcontact.contact.scan import FixedScan, Scan, pair_scan
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.starts import FIRST, Start
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
@@ -105,8 +105,10 @@ class FixedSearch:
 
     # In the resolution of contact.
 
-    def survey(self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], activity: float) -> Survey:
-        """Return number and moments of the points whose gap is below `activity` [mm]."""
+    def survey(
+        self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], activity: float
+    ) -> tuple[Int[Array, " n"], Float[Array, "n side moment"]]:
+        """Return the number of points whose gap is below `activity` [mm], and their moments."""
         return self._all_points.survey(X_RM, deviations, activity)
 
     @cached_property

@@ -1,6 +1,6 @@
 """Steps of free bodies: each step ends before bodies penetrate, so that no constraints contradict each other."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,6 @@ from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import min_gaps
 from tolcontact.contact.starts import FREE_WHERE_RAW, STRIDE
 from tolcontact.contact.state import State, Task
-from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics import Group
 
 MAX_HALVINGS = 20
@@ -34,13 +33,12 @@ class FreeSteps:
     def __init__(
         self,
         group: Group,
-        pairs: Sequence[ContactPoints],
         candidates: Candidates,
         limits: AcceptanceLimits,
         relate: Callable[..., np.ndarray],
         energy: Callable[[Task, State], np.ndarray],
     ) -> None:
-        self._group, self._pairs, self._candidates, self._limits = group, pairs, candidates, limits
+        self._group, self._candidates, self._limits = group, candidates, limits
         self._relate, self._energy = relate, energy
         self._centres = np.array([np.asarray(mobility.centre, dtype=float).ravel() for mobility in group.mobilities])
 
@@ -102,7 +100,7 @@ class FreeSteps:
                 rows = np.flatnonzero(guard.interferes(relative[:, k]))
                 if not rows.size:
                     continue
-                is_free, way, pair = False, guard.ways_out(relative[rows, k]), self._pairs[k]
+                is_free, way, pair = False, guard.ways_out(relative[rows, k]), self._candidates.pairs[k].pair
                 assert pair.reference is not None
                 sides = self._group.position(pair.moving), self._group.position(pair.reference)
                 normals = np.einsum("nij,nj->ni", pose.rotation(poses[rows, sides[1]]), way.normals)

@@ -51,9 +51,7 @@ class ContactResolver:
         self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
         self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size, max_turn)
-        self._free_steps = FreeSteps(
-            group.group, self.contact_points, self._candidates, self._limits, self._relate, self._energy_of
-        )
+        self._free_steps = FreeSteps(group.group, self._candidates, self._limits, self._relate, self._energy_of)
 
     def twin(self) -> "ContactResolver":
         """Return the same resolver for another thread."""

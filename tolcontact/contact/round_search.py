@@ -7,7 +7,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.compilation import Program
 from tolcontact.contact.fixed_search import Carriers, FixedSearch, Search
-from tolcontact.contact.scan import Scan, Survey
+from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
 from tolcontact.discretization import RoundContact
 from tolcontact.mechanics import MOMENTS
@@ -67,8 +67,8 @@ class RoundSearch(FixedSearch, Scan):
     def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         return np.asarray(self.gaps(relative, deviations).min(axis=1))
 
-    def survey(self, X_RM: np.ndarray, deviations: np.ndarray, activity: float) -> Survey:
+    def survey(self, X_RM: np.ndarray, deviations: np.ndarray, activity: float) -> tuple[np.ndarray, np.ndarray]:
         active = self.gaps(X_RM, deviations) < activity
         sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self._tables]
         moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
-        return Survey(active.sum(axis=1), moments)
+        return active.sum(axis=1), moments

@@ -24,13 +24,6 @@ NOTHING = np.empty((0, 0))
 NOT_RAISED = kernel.Raised(NOTHING, NOTHING, NOTHING, np.empty(0, dtype=np.int64))
 
 
-class Survey(NamedTuple):
-    """The number of active points of a pair (realization,), and their moments (realization, side, moment)."""
-
-    active: Int[Array, " realization"]
-    moments: Float[Array, "realization side moment"]
-
-
 class Deepest(NamedTuple):
     """The deepest point of each cluster, and its depth [mm], both (realization, cluster)."""
 
@@ -116,14 +109,14 @@ class FixedScan(Scan):
 
     def survey(
         self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"], activity: float
-    ) -> Survey:
-        """Return number and moments of the points whose gap is below `activity` [mm]."""
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return number (realization,) and moments (realization, side, moment) of points whose gap is below `activity` [mm]."""
         count = len(relative)
         active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
         flat = moments.reshape(count, self._table.shape[1])
         kernel.survey(self.points, self._table, *self._sums, poses, heights, activity, active, flat)
-        return Survey(active, moments)
+        return active, moments
 
     def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         return self.deepest_of(self.clusters[[0, -1]], relative, deviations)[1][:, 0]

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from tolcontact.discretization import RoundPoint, RoundPoints
-from tolcontact.mechanics.gap import GapTerms
+from tolcontact.discretization import RoundContact, RoundPoint, RoundPoints
+from tolcontact.mechanics.gap import FixedGaps, GapMap, GapTerms, Point, RowPoints
+from tolcontact.mechanics.group_equations import face_heights
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 from tolcontact.mechanics.round_terms import Terms, round_terms
 from tolcontact.mechanics.symmetric_products import congruent
@@ -62,6 +63,37 @@ def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.S
         hollow_curvature=sum((body.hollow_curvature for body in bodies), ca.SX(freedoms, freedoms)),
         distances=ca.vertcat(*distances),
     )
+
+
+class RoundGaps(FixedGaps):
+    """Gaps of balls and shafts against walls, at points that follow from every pose (see round_gap)."""
+
+    def __init__(self, pair: RoundContact) -> None:
+        self._pair, self._round = pair, pair.round
+        self.key = pair.round.fingerprint
+
+    def compiled(self, inputs: int) -> GapMap | ca.Function:
+        """Return the Function X_RM, deviations -> gaps and distances (point, 1) [mm], see GapTerms."""
+        X_RM, deviations = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("deviations", inputs)
+        terms = self._at(X_RM, face_heights(self._pair, deviations))
+        outputs = {"gaps": terms.gaps, "distances": terms.distances}
+        return ca.Function("round_gaps", [X_RM, deviations], [*outputs.values()], ["X_RM", "deviations"], [*outputs])
+
+    def points(self, chosen: np.ndarray, deviations: ca.SX) -> list[Point]:
+        return []
+
+    def values(self, X_RM: Pose, heights: ca.SX, points: RowPoints) -> Sequence[ca.SX]:
+        return ca.vertsplit(self._at(X_RM.vector(), heights).gaps)
+
+    def rows(self, X_RM: Pose, by_z: ca.SX, heights: ca.SX, points: RowPoints, reactions: ca.SX) -> GapTerms:
+        z, count = sorted(set(by_z.sparsity().get_triplet()[1])), by_z.size2()  # increments of the two parts of the pair
+        terms = round_gaps(self._round, X_RM.vector(), heights, reactions, by_z[:, z])
+        slopes, curvature, hollow_curvature = (ca.SX(rows, count) for rows in (len(self._round), count, count))
+        slopes[:, z], curvature[z, z], hollow_curvature[z, z] = terms.slopes, terms.curvature, terms.hollow_curvature
+        return terms._replace(slopes=slopes, curvature=curvature, hollow_curvature=hollow_curvature)
+
+    def _at(self, X_RM: ca.SX, heights: ca.SX) -> GapTerms:
+        return round_gaps(self._round, X_RM, heights, ca.SX(len(self._round), 1), ca.SX(ENTRIES, 0))
 
 
 class _Body:

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-from tolcontact.contact.scan import Deepest, Survey
+from tolcontact.contact.scan import Deepest
 
 
 def gaps(scan, relative, deviations):
@@ -21,7 +21,7 @@ def gaps(scan, relative, deviations):
 def survey(scan, relative, deviations, activity):
     active = gaps(scan, relative, deviations) < activity
     sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in scan.tables]
-    return Survey(active.sum(axis=1), np.array(sums).transpose(2, 0, 1))
+    return active.sum(axis=1), np.array(sums).transpose(2, 0, 1)
 
 
 def deepest(scan, relative, deviations, may_carry=None):
