@@ -14,9 +14,10 @@ from tolcontact.contact.guard import GUARD, Guard
 from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
 from tolcontact.discretization import FIRST_POINT, raised_places
-from tolcontact.geometry.meeting import NEARNESS, Meeting
+from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting, parting
+from tolcontact.geometry.places import Look
 
 EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
 
@@ -77,16 +78,14 @@ class BoundedSearch(FixedSearch):
         if start.free:
             meeting = self._free if kept is None else self._widened
             deepest = np.full(len(X_RM), self.free_depth) if deepest is None else deepest
+        look = Look(kept, search.width * self.edge_error, ceilings=search.ceilings)
         return bounded_scan(
-            self.pair, meeting, X_RM, deviations, kept,
-            error=search.width * self.edge_error,
-            nearness=NEARNESS if search.width <= 1 else np.inf,
+            self.pair, meeting, X_RM, deviations, look if search.width <= 1 else look._replace(nearness=np.inf),
             depth=self._bulge if self.has_minima else np.inf,
+            deepest=deepest,
             guard=self.guard if start.guarded and self.adds_guard else None,
             parting=self.parting if start.parted else None,
             former_labels=labels,
-            deepest=deepest,
-            ceilings=search.ceilings,
         )  # fmt: skip
 
     @cached_property
