@@ -88,7 +88,7 @@ def seated_contacts(program: Program) -> Touching | None:
     if block.status[0] not in terms.CERTIFIED:
         return None
     poses, pairs = block.poses[:, terms.CORRECTED], program.nominal.pairs
-    relative = seated.observe(poses=poses, deviations=deviations)["relative"].reshape(1, len(pairs), pose.ENTRIES)
+    _, relative = seated.observed(poses, deviations)
     places = [
         _in_assembly(_touching(seated, k, relative[:, k], deviations), poses[0, pair.reference or 0])
         for k, pair in enumerate(pairs)

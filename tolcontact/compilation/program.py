@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from tolcontact.arrays import Array, Float
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, Trial, allowed_depths, bounded_pairs
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp, row_count
 from tolcontact.compilation.contact_rows import MANY_SLOTS, SLOTS, standing_points
@@ -132,6 +133,13 @@ class Program(Pictured):
             )
         return lines
 
+    def observed(
+        self, poses: Float[Array, "n ..."], deviations: Float[Array, "n contributor"]
+    ) -> tuple[Float[Array, "n measure"], Float[Array, "n pair 12"]]:
+        """Return the measures, and X_RM of every pair, at some poses."""
+        results = self.observe(poses=poses, deviations=deviations)
+        return results["measured"], results["relative"].reshape(len(poses), len(self.nominal.pairs), ENTRIES)
+
     def limits(self, measure: int) -> Limits:
         """Return the limits of a measure, given by index, with its accuracy."""
         nominal, accuracy = float(self.nominal_measures[measure]), float(self.accuracies[measure])
@@ -211,10 +219,9 @@ def _place(nominal: Nominal, deviations: ca.SX) -> NamedFunction:
 
 def _observe(nominal: Nominal, entries: ca.SX, deviations: ca.SX, values: Sequence[ca.SX]) -> NamedFunction:
     """Return the function of the measures, with these `values`, and of X_RM of each pair, see Program."""
-    poses = poses_of(entries)
-    pairs = [(pair, poses[pair.moving], None if pair.reference is None else poses[pair.reference]) for pair in nominal.pairs]
-    X_RM = [facing_pose(face_poses(pair, deviations), moving, reference).vector() for pair, moving, reference in pairs]
-    results = [ca.vertcat(*values), ca.vertcat(*X_RM)]
+    at = poses_of(entries).__getitem__
+    relative = (facing_pose(pair, face_poses(pair, deviations), at) for pair in nominal.pairs)
+    results = [ca.vertcat(*values), ca.vertcat(*(X_RM.vector() for X_RM in relative))]
     return NamedFunction.dense(
         ca.Function("observe", [entries, deviations], results, ["poses", "deviations"], ["measured", "relative"])
     )

@@ -10,7 +10,7 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.bounded_search import FREE_SHARE, BoundedSearch
 from tolcontact.contact.fixed_search import MIN_BULGE, Carriers, Search
-from tolcontact.contact.kinds import pair_search
+from tolcontact.contact.pair_search import pair_search
 from tolcontact.contact.scan import Scan, min_gaps
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.starts import Start

@@ -1,6 +1,6 @@
 """The search of fixed contact points: all of them, the points that may be active, and their positions at other poses.
 
-Other kinds of contact derive from it and replace what differs, in a file of their own (see round_search, bounded_search).
+Other searches derive from it (see standing_search, bounded_search).
 """
 
 from collections.abc import Sequence

@@ -38,11 +38,10 @@ class TrialDraws:
         """Return the draws of a program, without those that have no finite pose."""
         deviations = program.draws(seed=TRIAL_SEED, start=0, stop=DRAWS)
         placed = program.place(deviations=deviations)["poses"]
-        observed = program.observe(poses=placed, deviations=deviations)
-        relative = observed["relative"].reshape(len(deviations), len(program.nominal.pairs), pose.ENTRIES)
+        measured, relative = program.observed(placed, deviations)
         finite = np.isfinite(relative).all(axis=(1, 2))
         poses = placed.reshape(len(deviations), len(program.nominal.parts), pose.ENTRIES)
-        return cls(program, deviations[finite], relative[finite], observed["measured"][finite], poses[finite])
+        return cls(program, deviations[finite], relative[finite], measured[finite], poses[finite])
 
     def some(self, rows: Int[Array, " k"]) -> "TrialDraws":
         """Return some of these draws, rows (k,)."""

@@ -42,9 +42,8 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
     nominal = program.nominal
     ended = max(ENDED_SHARE * min(nominal.assembly.smallest_zone(), DEFAULT_RANGE), ON_PLANE_GAP)
     surfaces = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
-    relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), 12)
-    raw = program.place(deviations=deviations)["poses"]
-    raw_relative = program.observe(poses=raw, deviations=deviations)["relative"].reshape(relative.shape)
+    _, relative = program.observed(poses, deviations)
+    _, raw_relative = program.observed(program.place(deviations=deviations)["poses"], deviations)
     for k, pair in enumerate(nominal.pairs):
         faces = nominal.face_pair(k)
         if faces is None or pair.reference is None or pair.is_springy:  # compliant faces may penetrate

@@ -38,7 +38,7 @@ def count_touching(
     """Return the counts at corrected poses (realization, part, 12), for deviations (realization, contributor)."""
     counts = [np.zeros(len(pair.P_m), dtype=np.int64) for pair in program.nominal.pairs]
     if len(poses) and counts:
-        relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(counts), -1)
+        _, relative = program.observed(poses, deviations)
         for k, pair in enumerate(program.nominal.pairs):
             if not pair.elastic:
                 X_RM = np.ascontiguousarray(relative[:, k])

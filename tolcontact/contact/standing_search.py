@@ -1,25 +1,23 @@
-"""The search of round contact: none, since the points of balls and shafts follow from every pose and always have a row."""
+"""Points that follow from every pose and always have a row of the QP: nothing is searched."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from tolcontact import poses as pose
 from tolcontact.compilation import Program
 from tolcontact.contact.fixed_search import Carriers, FixedSearch, Search
 from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
-from tolcontact.discretization import RoundContact
+from tolcontact.discretization import FollowingContact
 from tolcontact.mechanics import MOMENTS
 
-OVERHANG_SHARE = 0.01  # of their radius: overhang beyond a wall at which balls and shafts that travelled far may be active
 STEP = 1e-6  # mm, for finite differences of the gaps
 
 
-class RoundSearch(FixedSearch, Scan):
-    """The points of balls and shafts against walls. It is its own scan, at any pose."""
+class StandingSearch(FixedSearch, Scan):
+    """The points of a pair whose gaps are a function of the pose. It is its own scan, at any pose."""
 
-    pair: RoundContact
+    pair: FollowingContact
 
     def __init__(self, program: Program, index: int, tables: Sequence[np.ndarray] = ()) -> None:
         super().__init__(program, index, tables)
@@ -33,7 +31,7 @@ class RoundSearch(FixedSearch, Scan):
         return np.asarray((self._at(X_RM=X_RM, deviations=deviations)["distances"] < limit).sum(axis=0))
 
     def touching(self, X_RM: np.ndarray, deviations: np.ndarray, nearness: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points at which balls and shafts touch walls; normals are the derivatives of gaps by translation."""
+        """Return the points that touch; normals are the derivatives of gaps by translation."""
         shifts = STEP * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
         X = np.repeat(X_RM, len(shifts), axis=0)
         X[:, -3:] += shifts
@@ -41,9 +39,7 @@ class RoundSearch(FixedSearch, Scan):
         is_near = distances[0] < nearness
         normals = ((distances[1:4] - distances[4:]) / (2 * STEP)).T[is_near]
         normals /= np.linalg.norm(normals, axis=1)[:, None]
-        centres, radii, on_moving = (self.pair.round.points[name][is_near] for name in ("centre", "radius", "on_moving"))
-        at_body = np.where(on_moving[:, None], pose.apply(X_RM[0], centres), centres)
-        return at_body - np.where(on_moving, radii, -radii)[:, None] * normals, normals
+        return self.pair.touching(X_RM[0], is_near, normals), normals
 
     def scan(
         self,
@@ -59,10 +55,9 @@ class RoundSearch(FixedSearch, Scan):
         return None
 
     def carriers(self, loaded: np.ndarray, standing: np.ndarray | None = None, slots: Slots | None = None) -> Carriers:
-        points = self.pair.round.points
-        realization, column = np.nonzero(loaded & ~points["cut"].any(axis=1))  # a shaft may continue beyond a wall
-        spacing = OVERHANG_SHARE * float(points["radius"].max())
-        return Carriers(realization, points["centre"][column], points["on_moving"][column], spacing)
+        places, on_moving, may_not_overhang, overhang = self.pair.ends()
+        realization, column = np.nonzero(loaded & may_not_overhang)
+        return Carriers(realization, places[column], on_moving[column], overhang)
 
     def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         return np.asarray(self.gaps(relative, deviations).min(axis=1))
