@@ -57,12 +57,7 @@ class BoundedSearch(FixedSearch):
         return pose.apply(X_RM[0], raised.places.P_m[0, is_near]), raised.places.n_r[0, is_near]
 
     def scan(
-        self,
-        X_RM: np.ndarray,
-        deviations: np.ndarray,
-        search: Search,
-        former: Scan | None = None,
-        slots: Slots | None = None,
+        self, X_RM: np.ndarray, deviations: np.ndarray, search: Search, former: Scan | None, slots: Slots | None
     ) -> BoundedScan:
         """Return the places at X_RM.
 

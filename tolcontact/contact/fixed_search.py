@@ -127,8 +127,8 @@ class FixedSearch:
         X_RM: Float[Array, "n 12"],
         deviations: Float[Array, "n contributor"],
         search: Search,
-        former: Scan | None = None,
-        slots: Slots | None = None,
+        former: Scan | None,
+        slots: Slots | None,
     ) -> Scan:
         """Return the scan of the points that may be active at X_RM.
 

@@ -41,14 +41,7 @@ class StandingSearch(FixedSearch, Scan):
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         return self.pair.touching(X_RM[0], is_near, normals), normals
 
-    def scan(
-        self,
-        X_RM: np.ndarray,
-        deviations: np.ndarray,
-        search: Search,
-        former: Scan | None = None,
-        slots: Slots | None = None,
-    ) -> Scan:
+    def scan(self, X_RM: np.ndarray, deviations: np.ndarray, search: Search, former: Scan | None, slots: Slots | None) -> Scan:
         return self
 
     def raw_active(self, X_RM: np.ndarray, deviations: np.ndarray, activity: float) -> None:

@@ -5,7 +5,8 @@
 
 from tolcontact.discretization.coordinates_in_words import coordinates_in_words
 from tolcontact.discretization.discretizing import discretize
-from tolcontact.discretization.fixed_contact import ContactPoints, FollowingContact
+from tolcontact.discretization.fixed_contact import ContactPoints
+from tolcontact.discretization.following_contact import FollowingContact
 from tolcontact.discretization.form_places import FIRST_POINT, raised_places, rim_points
 from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.measured_planes import MeasuredPlanes, measured_planes

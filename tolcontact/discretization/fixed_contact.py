@@ -1,13 +1,12 @@
 """Contact points of a pair that are fixed for all realizations: samples of two faces, or locators.
 
-Other kinds of contact derive from FollowingContact, each in a file of its own (see round_contact).
+Other kinds of contact derive from FollowingContact (see following_contact).
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -296,59 +295,3 @@ class ContactPoints:
     def is_supports(self) -> bool:
         """Whether the points are locators."""
         return self.reference_face is None
-
-
-class FollowingContact(ContactPoints, ABC):
-    """Contact whose points follow from every pose and always have a row: nothing is searched, and no triangle enters the gaps.
-
-    A kind of contact derives from it. Its equations derive from FixedGaps (see mechanics/pair_gaps).
-    """
-
-    samples_faces: ClassVar[bool] = False
-
-    @classmethod
-    @abstractmethod
-    def between(
-        cls, moving: Surface, reference: Surface, reach: float, rounding: float, common: Mapping[str, Any]
-    ) -> Self | None:
-        """Return the contact of two faces; None if they may touch in another way.
-
-        reach      [mm]: faces at a larger distance have no points
-        rounding   [mm]: coordinate error of both bodies
-        common     the fields that do not depend on the kind
-        """
-
-    @abstractmethod
-    def touching(
-        self, X_RM: Float[Array, "1 12"], points: Bool[Array, " point"], normals: Float[Array, "k 3"]
-    ) -> Float[Array, "k 3"]:
-        """Return the places of some points that touch at one pose, with normals there, in the frame of the reference part."""
-
-    @abstractmethod
-    def ends(self) -> tuple[Float[Array, "point 3"], Bool[Array, " point"], Bool[Array, " point"], float]:
-        """Return what must not overhang the other face of a point under load.
-
-        These are nominal places, whether they are on the moving part, whether they must not, and the overhang [mm] that may be.
-        """
-
-    @cached_property
-    def facing(self) -> np.ndarray:
-        return np.ones(len(self.P_m))
-
-    def without(self, held: np.ndarray, distance: float) -> Self:
-        return self
-
-    def raw_depth(self, X_RM: np.ndarray, deviations: np.ndarray) -> float:
-        return self.travel(X_RM)
-
-    @property
-    def curvature(self) -> float:
-        return 0.0
-
-    @property
-    def may_miss_ends(self) -> bool:
-        return False
-
-    @cached_property
-    def weights(self) -> np.ndarray:
-        return np.ones(len(self.P_m))

@@ -14,7 +14,7 @@ import trimesh
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
-from tolcontact.discretization.fixed_contact import FollowingContact
+from tolcontact.discretization.following_contact import FollowingContact
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, RoundPoint, RoundPoints, arc, tangent_directions
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, RoundSurface, Sphere
