@@ -3,7 +3,7 @@
 .. include:: ../guide/contact.md
 """
 
-from tolcontact.contact.pair_search import pair_search
+from tolcontact.contact.candidates import pair_search
 from tolcontact.contact.resolver import ContactResolver
 from tolcontact.contact.state import Resolved
 

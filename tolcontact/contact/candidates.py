@@ -9,10 +9,10 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.bounded_search import FREE_SHARE, BoundedSearch
-from tolcontact.contact.fixed_search import MIN_BULGE, Carriers, Search
-from tolcontact.contact.pair_search import pair_search
+from tolcontact.contact.fixed_search import MIN_BULGE, Carriers, FixedSearch, Search
 from tolcontact.contact.scan import Scan, min_gaps
 from tolcontact.contact.slots import Slots
+from tolcontact.contact.standing_search import StandingSearch
 from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task
 from tolcontact.geometry.parting import Parting
@@ -178,3 +178,10 @@ class Candidates:
         if isinstance(standing, int):
             return self.pairs[k].carriers(loaded, slots=state.slots[self._varying.index(k)])
         return self.pairs[k].carriers(loaded, standing)
+
+
+def pair_search(program: Program, index: int, tables: Sequence[np.ndarray] = ()) -> FixedSearch:
+    """Return the search of a pair, with the moment tables of its sides (see FixedSearch)."""
+    if index in program.meetings:
+        return BoundedSearch(program, index, tables)
+    return (FixedSearch if program.nominal.pairs[index].samples_faces else StandingSearch)(program, index, tables)

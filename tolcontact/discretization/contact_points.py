@@ -202,51 +202,46 @@ def _with_curvature(
 
 
 def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> Iterator[ContactPoints]:
-    """Yield the one-sided locators of each free part, or of each part of a free joint, as a contact pair; then its springs."""
+    """Yield the one-sided locators of each free part, or of each part of a free joint, as a contact pair.
+
+    Two-sided locators that hold an elastic part follow, each a pair of one point, which pushes and pulls; then compliant ones.
+    """
     start = 0
     for index, part in enumerate(parts):
-        owners = np.array(part.owners or (index,) * len(part.locators), dtype=int)
-        for owner in np.unique(owners[part.locators.one_sided]) if part.free else ():
-            supports = np.flatnonzero(part.locators.one_sided & (owners == owner))
-            P, n = part.locators.points[supports], part.locators.directions[supports]
-            offsets = _support_offsets(part.locators, start, supports)
-            scene = next(scene for scene in scenes if scene.station == part.station)
-            name = scene.supports_name(parts[owner].part)
-            stiffness = np.where(part.locators.springy, part.locators.stiffness, np.inf)[supports]
-            numbers = start + supports
-            yield ContactPoints(
-                name, int(owner), part.parent, P, P, n, offsets, locators=numbers, stiffness=stiffness,
-                elastic=bool(part.locators.elastic.any()),
-            )  # fmt: skip
-        for number in np.flatnonzero(part.locators.elastic & ~part.locators.one_sided) if part.free else ():
-            yield _holding_pair(part, int(owners[number]), start, int(number))
-        for number in (
-            np.flatnonzero(part.locators.springy & ~part.locators.one_sided & ~part.locators.elastic) if part.free else ()
-        ):
-            yield _spring_pair(part, int(owners[number]), start, int(number))
-        start += len(part.locators)
+        locators, owners = part.locators, np.array(part.owners or (index,) * len(part.locators), dtype=int)
+        scene = next(scene for scene in scenes if scene.station == part.station)
+        for owner in np.unique(owners[locators.one_sided]) if part.free else ():
+            supports = np.flatnonzero(locators.one_sided & (owners == owner))
+            name, elastic = scene.supports_name(parts[owner].part), bool(locators.elastic.any())
+            yield _locator_pair(part, name, int(owner), start, supports, elastic=elastic)
+        for number in np.flatnonzero(locators.elastic & ~locators.one_sided) if part.free else ():
+            label, owner, point = locators.labels[number], int(owners[number]), np.array([number])
+            yield _locator_pair(part, label, owner, start, point, holds=True, elastic=True)
+        for number in np.flatnonzero(locators.springy & ~locators.one_sided & ~locators.elastic) if part.free else ():
+            yield _spring_pair(_locator_pair(part, locators.labels[number], int(owners[number]), start, np.array([number])))
+        start += len(locators)
 
 
-def _holding_pair(part: NominalPart, owner: int, start: int, number: int) -> ContactPoints:
-    """Return a two-sided locator of an elastic part as a pair of one point, which pushes and pulls."""
-    locators, point = part.locators, np.array([number])
-    P, stiffness = locators.points[point], np.where(locators.springy, locators.stiffness, np.inf)[point]
+def _locator_pair(
+    part: NominalPart, name: str, owner: int, start: int, numbers: np.ndarray, *, holds: bool = False, elastic: bool = False
+) -> ContactPoints:
+    """Return some locators of a part, by their numbers, as a pair."""
+    locators = part.locators
+    P, n, stiffness = (
+        values[numbers]
+        for values in (locators.points, locators.directions, np.where(locators.springy, locators.stiffness, np.inf))
+    )
+    offsets, of_all = _support_offsets(locators, start, numbers), start + numbers
     return ContactPoints(
-        locators.labels[number], owner, part.parent, P, P, locators.directions[point], _support_offsets(locators, start, point),
-        locators=start + point, stiffness=stiffness, holds=True, elastic=True,
-    )  # fmt: skip
+        name, owner, part.parent, P, P, n, offsets, locators=of_all, stiffness=stiffness, holds=holds, elastic=elastic
+    )
 
 
-def _spring_pair(part: NominalPart, owner: int, start: int, number: int) -> ContactPoints:
+def _spring_pair(locator: ContactPoints) -> ContactPoints:
     """Return a compliant two-sided locator as a pair: a spring that pushes and one that pulls, at the same point."""
-    locators, twice = part.locators, np.array([number, number])
-    P, signs = locators.points[twice], np.array([1.0, -1.0])
-    heights = _support_offsets(locators, start, twice[:1])
-    offsets = Offsets(heights.columns, heights.matrix * signs)
-    return ContactPoints(
-        locators.labels[number], owner, part.parent, P, P, signs[:, None] * locators.directions[twice], offsets,
-        locators=start + twice, stiffness=locators.stiffness[twice], pulls=signs < 0,
-    )  # fmt: skip
+    both, signs = locator.take(np.array([0, 0])), np.array([1.0, -1.0])
+    offsets = Offsets(both.offsets.columns, both.offsets.matrix * signs)
+    return replace(both, n_r=signs[:, None] * both.n_r, offsets=offsets, pulls=signs < 0)
 
 
 def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Offsets:
