@@ -49,11 +49,19 @@ class TrialDraws:
 
     def nominal_gaps(self, k: int) -> Float[Array, " point"]:
         """Return the gaps (point,) [mm] of pair k in the nominal assembly."""
-        return pair_search(self.program, k).gaps(pose.AT_REST[None], np.zeros((1, self.deviations.shape[1])))[0]
+        return self._gaps(k, pose.AT_REST[None], np.zeros((1, self.deviations.shape[1])))[0]
 
     def gaps(self, k: int, points: np.ndarray) -> Float[Array, "n point"]:
         """Return the gaps (draw, point) [mm] of some points of pair k."""
-        return pair_search(self.program, k).gaps(self.relative[:, k], self.deviations, points)
+        return self._gaps(k, self.relative[:, k], self.deviations, points)
+
+    def _gaps(self, k: int, X_RM: np.ndarray, deviations: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
+        pair = self.program.nominal.pairs[k]
+        if not pair.samples_faces:
+            return pair_search(self.program, k).gaps(X_RM, deviations, points)
+        chosen_points = np.arange(len(pair.P_m)) if points is None else points
+        gaps = pair.nominal_gaps(X_RM, chosen_points) - pair.heights(deviations)[:, None]
+        return gaps - pair.form_heights(deviations, chosen_points)
 
     @cached_property
     def clashes(self) -> list[Clash]:
