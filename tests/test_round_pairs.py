@@ -35,14 +35,14 @@ def test_what_is_not_a_ball_or_a_shaft_beside_a_wall_has_points():
 
     hole = tc.Mesh(trimesh.creation.annulus(5.05, 20, 10, sections=48))
     upright = trimesh.creation.cylinder(5, 20, sections=48)
-    assert pair(upright, hole).round
-    assert not pair(upright, hole, points=100).round and not pair(upright, hole, spacing=1.0).round
+    assert not pair(upright, hole).samples_faces
+    assert pair(upright, hole, points=100).samples_faces and pair(upright, hole, spacing=1.0).samples_faces
     askew = upright.copy()
     askew.apply_transform(trimesh.transformations.rotation_matrix(0.005, [1, 0, 0]))
-    assert not pair(askew, hole).round  # its axis is not that of the hole
+    assert pair(askew, hole).samples_faces  # its axis is not that of the hole
     half = upright.copy()
     half.update_faces(half.triangles_center[:, 0] > 0)
-    assert not pair(half, hole).round  # it is not round on all sides
+    assert pair(half, hole).samples_faces  # it is not round on all sides
 
 
 def pair_between(moving, own, reference, other, at=(0, 0, 0)):
@@ -80,19 +80,19 @@ def grooved(radius, half, sides=40):
 @pytest.mark.slow
 def test_a_ball_beside_edges_gaps_and_curves_that_are_not_known_has_points():
     floor = strip([(-20, 0), (20, 0)])
-    assert pair_between(BALL, (), floor, (ANY,), at=(0, 0, 5)).round
+    assert not pair_between(BALL, (), floor, (ANY,), at=(0, 0, 5)).samples_faces
     step = strip([(-20, 0), (5, 0), (5, 2), (20, 2)])
-    assert not pair_between(BALL, (), step, (ANY,), at=(0.3, 0, 5)).round  # the step's edge is near
+    assert pair_between(BALL, (), step, (ANY,), at=(0.3, 0, 5)).samples_faces  # the step's edge is near
     trough = strip([(14 * np.sin(t), -8 * np.cos(t)) for t in np.linspace(-1.5, 1.5, 20)])
-    assert not pair_between(BALL, (), trough, (ANY,), at=(0, 0, -2.9)).round
-    assert pair_between(BALL, (), grooved(6, 1.5), (ANY,), at=(0, 0, -0.9)).round
+    assert pair_between(BALL, (), trough, (ANY,), at=(0, 0, -2.9)).samples_faces
+    assert not pair_between(BALL, (), grooved(6, 1.5), (ANY,), at=(0, 0, -0.9)).samples_faces
     lying = trimesh.creation.cylinder(5, 30, sections=48)
     lying.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
     barrel = (tc.select.Cylinder(),)
-    assert pair_between(lying, barrel, grooved(5.2, 1.5), (ANY,), at=(0, 0, -0.1)).round
-    assert not pair_between(lying, barrel, grooved(4.9, 1.5), (ANY,), at=(0, 0, 0.1)).round
+    assert not pair_between(lying, barrel, grooved(5.2, 1.5), (ANY,), at=(0, 0, -0.1)).samples_faces
+    assert pair_between(lying, barrel, grooved(4.9, 1.5), (ANY,), at=(0, 0, 0.1)).samples_faces
     small = grooved(4.5, 1.5)
-    assert not pair_between(BALL, (), small, (ANY,), at=(0, 0, 2)).round  # it rests on the groove's edges
+    assert pair_between(BALL, (), small, (ANY,), at=(0, 0, 2)).samples_faces  # it rests on the groove's edges
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ def test_walls_that_are_not_whole_between_their_ends_are_none():
         azimuth = np.arctan2(bore.triangles_center[:, 1], bore.triangles_center[:, 0])
         apart = np.abs((azimuth[:, None] - 2 * np.pi * np.arange(gaps) / gaps + np.pi) % (2 * np.pi) - np.pi).min(axis=1)
         bore.update_faces(apart > 0.35)
-        assert bool(pair_between(pin, (tc.select.Cylinder(),), bore, (tc.select.Cylinder(radius=5.05),)).round) == is_round
+        assert pair_between(pin, (tc.select.Cylinder(),), bore, (tc.select.Cylinder(radius=5.05),)).samples_faces != is_round
 
 
 def test_faces_that_look_opposite_ways_are_two():
@@ -123,7 +123,7 @@ def test_points_on_the_axis_of_a_hole_do_not_touch_its_wall():
     plug = trimesh.creation.cylinder(19.9, 10, sections=90)
     bore = trimesh.creation.annulus(20, 30, 20, sections=90)
     pair = pair_between(plug, (ANY,), bore, (tc.select.Cylinder(radius=20),))
-    assert not pair.round and (np.hypot(pair.P_m[:, 0], pair.P_m[:, 1]) > 17).all()
+    assert pair.samples_faces and (np.hypot(pair.P_m[:, 0], pair.P_m[:, 1]) > 17).all()
 
 
 def test_flat_faces_are_flat_however_they_are_turned():

@@ -155,6 +155,20 @@ def test_imports_keep_to_the_walls():
     assert not found, "\n".join(found)
 
 
+# A kind of contact is named in two files of its own, and in two tables; others ask its pairs what they do.
+KINDS = {
+    "RoundContact": {
+        "discretization/__init__.py", "discretization/round_contact.py", "discretization/contact_points.py",
+        "mechanics/round_gap.py", "mechanics/pair_gaps.py",
+    }
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_kind_of_contact_is_named_in_its_files_and_tables_alone(kind):
+    assert {str(file.relative_to(PACKAGE)) for file in FILES if kind in file.read_text(encoding="utf-8")} == KINDS[kind]
+
+
 def test_every_room_is_in_the_order():
     assert {room(str(f.relative_to(PACKAGE))) for f in FILES} == set(ORDER)
 

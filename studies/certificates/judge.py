@@ -18,7 +18,7 @@ import tolcontact as tc
 from studies.certificates.scenes import scene
 from tolcontact.compilation import Program
 from tolcontact.contact.acceptance import MAX_TURN
-from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
+from tolcontact.discretization import ContactPoints, Nominal, RoundContact, RoundPoints
 from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.testing.referee import ArchivedPoint
 from tolcontact.vocabulary import CORRECTED, RAW, Status
@@ -55,7 +55,7 @@ def contradictions(program: tc.Program, run: dict[str, np.ndarray]) -> collectio
         x_r = np.einsum("nij,pj->npi", R_r, pair.P_r) + t_r[:, None]
         n = np.einsum("nij,pj->npi", R_r, pair.n_r)
         gap = ((x_m - x_r) * n).sum(axis=2) - h_m[:, None] * pair.facing - h_r[:, None]
-        if pair.round:
+        if isinstance(pair, RoundContact):
             turn = R_r.swapaxes(1, 2)
             apart = np.einsum("nij,nj->ni", turn, t_m - t_r)
             gap = np.stack([point.gaps(turn @ R_m, apart, h_m, h_r) for point in as_archived(pair.round)], axis=1)

@@ -109,15 +109,14 @@ def leverages(program: Program) -> np.ndarray:
 
 def _observed(program: Program, poses: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return measures (n, measure) and gaps (n, row) at poses (n, part * 12)."""
-    values = program.observe(poses=poses, deviations=deviations)
-    relative = values["relative"].reshape(len(poses), len(program.nominal.pairs), pose.ENTRIES)
+    measured, relative = program.observed(poses, deviations)
     rows = []
-    for pair, gaps in enumerate(program.gaps):
-        if gaps is not None and not program.nominal.pairs[pair].is_springy:  # springs permit penetration
+    for k, (pair, gaps) in enumerate(zip(program.nominal.pairs, program.gaps, strict=True)):
+        if pair.samples_faces and not pair.is_springy:  # springs permit penetration
             by_pose, by_deviations = np.split(gaps.coordinates[:, gaps.corners], [gaps.basis.shape[1]])
-            entries = np.column_stack([relative[:, pair], np.ones(len(poses))])
+            entries = np.column_stack([relative[:, k], np.ones(len(poses))])
             rows.append(entries @ gaps.basis @ by_pose + deviations[:, gaps.columns] @ by_deviations)
-    return values["measured"], np.column_stack([np.zeros((len(poses), 0)), *rows])
+    return measured, np.column_stack([np.zeros((len(poses), 0)), *rows])
 
 
 def _at_rest(program: Program, count: int) -> np.ndarray:

@@ -8,7 +8,7 @@ import xarray as xr
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
 from tolcontact.compilation import Program, compile_program
-from tolcontact.discretization import raised_places
+from tolcontact.contact import pair_search
 from tolcontact.errors import OptionError
 from tolcontact.method import Method
 from tolcontact.simulation import simulate_blocks
@@ -17,7 +17,6 @@ from tolcontact.variation import GivenDraws
 from tolcontact.workflow.models import Model
 
 SEATED, DRAWN = "where the forces seat them", "as drawn, since the forces find no pose without friction"
-STEP = 1e-6  # mm, for finite differences of the gaps of round faces
 
 
 def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dataset:
@@ -89,7 +88,7 @@ def seated_contacts(program: Program) -> Touching | None:
     if block.status[0] not in terms.CERTIFIED:
         return None
     poses, pairs = block.poses[:, terms.CORRECTED], program.nominal.pairs
-    relative = seated.observe(poses=poses, deviations=deviations)["relative"].reshape(1, len(pairs), pose.ENTRIES)
+    _, relative = seated.observed(poses, deviations)
     places = [
         _in_assembly(_touching(seated, k, relative[:, k], deviations), poses[0, pair.reference or 0])
         for k, pair in enumerate(pairs)
@@ -108,27 +107,4 @@ def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray
     pair = program.nominal.pairs[k]
     assert pair.moving_face is not None and pair.reference_face is not None
     nearness = TOUCH_SHARE * max(pair.moving_face.mesh.scale, pair.reference_face.mesh.scale)
-    if pair.round is not None:
-        return _touching_round(program, k, X_RM, deviations, nearness)
-    if k in program.meetings:
-        raised = raised_places(pair, program.meetings[k], X_RM, deviations)
-        is_near = raised.gaps[0] < nearness
-        return TouchingPoints(pose.apply(X_RM[0], raised.places.P_m[0, is_near]), raised.places.n_r[0, is_near])
-    gaps = pair.nominal_gaps(X_RM)[0]
-    return TouchingPoints(pose.apply(X_RM[0], pair.P_m[gaps < nearness]), pair.n_r[gaps < nearness])
-
-
-def _touching_round(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray, nearness: float) -> TouchingPoints:
-    """Return the points at which balls and shafts touch walls; normals are the derivatives of gaps by translation."""
-    pair = program.nominal.pairs[k]
-    assert pair.round is not None
-    shifts = STEP * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
-    X = np.repeat(X_RM, len(shifts), axis=0)
-    X[:, -3:] += shifts
-    distances = program.round_gaps[k](X_RM=X, deviations=np.repeat(deviations, len(shifts), axis=0))["distances"]
-    is_near = distances[0] < nearness
-    normals = ((distances[1:4] - distances[4:]) / (2 * STEP)).T[is_near]
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    centres, radii, on_moving = (pair.round.points[name][is_near] for name in ("centre", "radius", "on_moving"))
-    at_body = np.where(on_moving[:, None], pose.apply(X_RM[0], centres), centres)
-    return TouchingPoints(at_body - np.where(on_moving, radii, -radii)[:, None] * normals, normals)
+    return TouchingPoints(*pair_search(program, k).touching(X_RM, deviations, nearness))

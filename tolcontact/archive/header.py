@@ -265,14 +265,13 @@ def _face_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
 def _round_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
     """Return the values that determine where round faces touch, at any pose."""
     starts = np.cumsum([0, *(len(pair.P_m) for pair in nominal.pairs)])
-    rounds = [(starts[k] + np.arange(len(pair.round)), pair.round) for k, pair in enumerate(nominal.pairs) if pair.round]
-    if not rounds:
+    shapes = {k: pair.shapes for k, pair in enumerate(nominal.pairs) if pair.shapes is not None}
+    if not shapes:
         return {}
-    numbers, points = zip(*rounds, strict=True)
     return {
-        terms.POINT_OF_ROUND: np.concatenate(numbers),
-        **{v: np.concatenate([point.walls[name] for point in points]) for name, v in terms.OF_WALL.items()},
-        **{v: np.concatenate([point.points[name] for point in points]) for name, v in terms.OF_ROUND.items()},
+        terms.POINT_OF_ROUND: np.concatenate([np.arange(starts[k], starts[k + 1]) for k in shapes]),
+        **{v: np.concatenate([walls[name] for walls, _ in shapes.values()]) for name, v in terms.OF_WALL.items()},
+        **{v: np.concatenate([points[name] for _, points in shapes.values()]) for name, v in terms.OF_ROUND.items()},
     }
 
 

@@ -98,7 +98,7 @@ def _weighting(program: Program) -> str:
         if method.is_exact
         else ""
     )
-    are_centres = any(pair.round is not None and pair.round.are_beside for pair in program.nominal.pairs)
+    are_centres = any(pair.counts_centres for pair in program.nominal.pairs)
     return f"{method.objective}{by_area}{', balls and shafts by their centres' if are_centres else ''}"
 
 

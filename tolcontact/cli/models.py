@@ -107,7 +107,7 @@ def check(
         common.echo(f"  {line}")
     if program.stored_coordinates:
         common.echo(f"  {program.stored_coordinates}")
-    if not program.nominal.assembly.forces and any(pair.round and not pair.round.are_beside for pair in program.nominal.pairs):
+    if not program.nominal.assembly.forces and not all(pair.stays.all() for pair in program.nominal.pairs):
         common.echo(f"  {PRESS}")
     if drawing:
         _print_remarks(program.nominal)

@@ -78,8 +78,7 @@ def push(pair: ContactPoints, X_RM: Float[Array, "n 12"], deviations: Float[Arra
     deviations   (n, contributor)
     presses      whether forces also close the gaps
     """
-    depth = _travel(pair, X_RM) if pair.round is not None else max(-float(pair.least_gap(X_RM, deviations).min()), 0.0)
-    return depth + (clearance(pair) if presses else 0.0)
+    return pair.raw_depth(X_RM, deviations) + (pair.clearance if presses else 0.0)
 
 
 def _bounded_pair(
@@ -100,15 +99,10 @@ def _bounded_pair(
     nominal, pair = watch.nominal, watch.nominal.pairs[index]
     smallest = nominal.assembly.smallest_zone()
     nothing = None, Trial(np.nan, np.nan)
-    if pair.moving_face is None or pair.reference_face is None or pair.reference is None or pair.round is not None:
+    if not pair.may_miss_ends or not np.isfinite(smallest):
         return nothing
-    is_smooth = not pair.has_form or (pair.moving_face.is_flat and pair.reference_face.is_flat)
-    if pair.is_springy or not np.isfinite(smallest) or not is_smooth:
-        return nothing
-    highest = float(np.abs(pair.heights(deviations)).max())
-    if pair.has_form:
-        highest += float(pair.form(deviations).highest().sum(axis=0).max())
-    travel = _travel(pair, X_RM) + highest
+    assert pair.moving_face is not None and pair.reference_face is not None and pair.reference is not None
+    travel = pair.travel(X_RM) + pair.highest(deviations)
     tilt = float(pose.turn(X_RM, pose.AT_REST[None]).max())
     size = float(np.ptp(pair.moving_face.mesh.vertices, axis=0).max())
     bodies = nominal.parts[pair.moving].body, nominal.parts[pair.reference].body
@@ -117,7 +111,7 @@ def _bounded_pair(
         tilt=tilt + pushed / size,
         spread=travel,
         overlap=pair.coordinate_error + _overlap(watch, pair),
-        clearance=clearance(pair),
+        clearance=pair.clearance,
     )
     pair_meeting = meeting((pair.moving_face, pair.reference_face), bodies, reach, has_form=pair.has_form)
     if pair_meeting is not None:
@@ -173,18 +167,6 @@ def _error_of_planes(
         return max(pool.map(compared, blocks), default=0.0)
 
 
-def _travel(pair: ContactPoints, X_RM: np.ndarray) -> float:
-    """Return the travel [mm] of the moving face, or of the contact points of a pair without one, from the nominal position."""
-    bounds = pair.moving_face.mesh.bounds if pair.moving_face is not None else [pair.P_m.min(axis=0), pair.P_m.max(axis=0)]
-    corners = np.array(np.meshgrid(*np.array(bounds).T)).reshape(3, -1).T
-    return float(np.linalg.norm(pose.apply(X_RM - pose.AT_REST, corners), axis=2).max())
-
-
-def clearance(pair: ContactPoints) -> float:
-    """Return the smallest nominal distance [mm] of contact points from their projections."""
-    return float(np.linalg.norm(pair.P_m - pair.P_r, axis=1).min())
-
-
 def allowed_depths(
     nominal: Nominal, meetings: Mapping[int, Meeting], trials: Mapping[int, Trial]
 ) -> dict[tuple[int, int], float]:
@@ -198,11 +180,10 @@ def allowed_depths(
     for k, pair in enumerate(nominal.pairs):
         if pair.reference is not None and pair.moving_face is not None:
             bodies = ordered(pair.moving, pair.reference)
-            is_free = pair.is_springy or pair.has_form
             is_fixed = k in trials and k not in meetings and np.isfinite(trials[k].allowed)
             planes = PLANES_FACTOR * trials[k].allowed if is_fixed else 0.0
             rounding = 0.0 if k in meetings else pair.coordinate_error
-            depths[bodies] = max(depths.get(bodies, 0.0), np.inf if is_free else planes + rounding)
+            depths[bodies] = max(depths.get(bodies, 0.0), np.inf if pair.may_interfere else planes + rounding)
     return depths | dict.fromkeys(_declared_overlaps(nominal), np.inf)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from tolcontact.compilation.calls import Call, FunctionCalls, inline
 from tolcontact.compilation.conditioning import conditioned
-from tolcontact.compilation.contact_rows import contact_rows, row_points, spring_energy, standing_points
+from tolcontact.compilation.contact_rows import contact_rows, row_points, spring_energy
 from tolcontact.compilation.elastic_columns import ElasticColumns
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.outcome import outcome
@@ -28,7 +28,6 @@ from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS, linear, published, rigid
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.flexibility import Flexibility
-from tolcontact.mechanics.gap import GapMap
 from tolcontact.mechanics.group_equations import GroupEquations, face_heights, face_poses
 from tolcontact.mechanics.groups import Group, curved_pairs
 from tolcontact.mechanics.objective import energy
@@ -120,15 +119,14 @@ def row_count(points: np.ndarray | int) -> int:
 def contact_qp(
     nominal: Nominal,
     group: Group,
-    gaps: Sequence[GapMap | None],
     method: Method,
-    standing: Standing = (),
+    standing: Standing,
     call: Call | None = None,
     flexibility: Flexibility | None = None,
 ) -> ContactQP:
     """Return the Functions of a group.
 
-    `standing` lists the points of each pair of the group that always have a row, by default from `standing_points`. `call`
+    `standing` lists the points of each pair of the group that always have a row, or the number of its slots. `call`
     evaluates what recurs, by default in place, or with many bodies by FunctionCalls; both give the same results up to rounding.
     `flexibility` belongs to the rows if there are elastic parts.
     `_inputs` describes the inputs. The outputs for `p` parts, `q` pairs and `k` rows are:
@@ -144,7 +142,6 @@ def contact_qp(
                          the whole correction
     locator_residual     largest misfit [mm] of exact two-sided locators at `corrected`
     """
-    standing = standing or [standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
     inputs = _inputs(nominal, group, standing, bends=flexibility is not None)
     system = _equations(nominal, group, method, inputs)
     motion = system.motion(poses_of(inputs["poses"]))

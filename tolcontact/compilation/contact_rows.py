@@ -3,36 +3,20 @@
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics.flexibility import Flexibility
-from tolcontact.mechanics.gap import GapMap, gap
+from tolcontact.mechanics.gap import Point, RowPoints
 from tolcontact.mechanics.group_equations import GroupEquations
-from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
-from tolcontact.mechanics.round_gap import round_gaps
+from tolcontact.mechanics.pair_gaps import pair_gaps
+from tolcontact.mechanics.pose import ENTRIES, Pose
 from tolcontact.method import Method
 
 SLOTS, MANY_SLOTS = 8, 12  # of a pair of bounded faces, and of others; at most six independent rows can be active
-
-Point = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # P^m, P^r, n^r, and 1 if it has a row
-
-
-class RowPoints(NamedTuple):
-    """The points of a pair that have rows.
-
-    points       empty for a round pair
-    compliance   (row, 1) [mm/N]: of compliant points; 0 for rigid ones
-    bend         (12, 1): of the points in the slots of the previous step; None for points that always have a row, since their
-                 previous reactions are available
-    """
-
-    points: Sequence[Point]
-    compliance: ca.SX
-    bend: ca.SX | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +73,13 @@ def springs_of(compliance: ca.SX) -> list[int]:
     return [k for k in range(compliance.numel()) if not compliance[k].is_zero()]
 
 
-def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) -> np.ndarray | int:
+def standing_points(pair: ContactPoints, gaps: Any, method: Method) -> np.ndarray | int:
     """Return the points of a pair that always have a row, or the number of its slots for changing points.
 
-    Points of round faces always have a row. The same holds for points that can be the deepest, if they are few and fixed.
+    Points that follow from every pose always have a row. The same holds for points that can be the deepest, if they are few and
+    fixed.
     """
-    if gaps is None or pair.is_springy:
+    if not pair.samples_faces or pair.is_springy:
         return np.arange(len(pair.P_m))
     are_few = method.is_closed and len(gaps.corners) <= MANY_SLOTS and pair.minima is None
     return gaps.corners if are_few else MANY_SLOTS
@@ -111,39 +96,22 @@ def contact_rows(
 
     `reactions` (row, 1) are the reactions of the points in the previous step, see contact_qp.
     """
-    slopes: list[ca.SX] = []
-    pairs: list[int] = []
-    gaps, filled, compliance, relative, bends = ([] for _ in range(5))
+    pairs = list[int]()
+    slopes, gaps, filled, compliance, relative, bends = ([] for _ in range(6))
     curvature, hollow_curvature = (ca.SX(system.z.numel(), system.z.numel()) for _ in range(2))
     for k, (start, by_z) in enumerate(relative_poses(system, start_poses, end_poses)):
+        points, count = points_of_pairs[k], points_of_pairs[k].compliance.numel()
+        of_pair = reactions[len(pairs) : len(pairs) + count]
+        rows = pair_gaps(system.pair(k)).rows(start, by_z, system.heights[k], points, of_pair)
+        pairs += [k] * count
         relative.append(start.vector() + by_z @ system.z)
-        (points, pair_compliance, bend), pair = points_of_pairs[k], system.nominal.pairs[system.group.pairs[k]]
-        compliance.append(pair_compliance)
-        if pair.round is not None:
-            pair_reactions = reactions[len(pairs) : len(pairs) + len(pair.round)]
-            z = sorted(set(by_z.sparsity().get_triplet()[1]))  # increments of the two parts of the pair
-            pair_gaps = round_gaps(pair.round, start.vector(), system.heights[k], pair_reactions, by_z[:, z])
-            slopes.append(ca.SX(len(pair.round), system.z.numel()))
-            slopes[-1][:, z] = pair_gaps.slopes
-            gaps.append(pair_gaps.gaps)
-            filled.append(ca.SX.ones(len(pair.round)))
-            pairs += [k] * len(pair.round)
-            bends.append(pair_gaps.bends)
-            curvature[z, z] += pair_gaps.curvature
-            hollow_curvature[z, z] += pair_gaps.hollow_curvature
-            continue
-        total = ca.SX.zeros(ENTRIES) if bend is None else bend
-        for P_m, P_r, n_r, is_filled in points:
-            X = ca.SX.sym("X_RM", ENTRIES)
-            g = gap(pose_of(X), P_m, P_r, n_r)
-            gradient = ca.substitute(ca.jacobian(g, X), X, start.vector())
-            if bend is None:
-                total += gradient.T * reactions[len(pairs)]
-            slopes.append(gradient @ by_z)
-            gaps.append(ca.substitute(g, X, start.vector()))
-            filled.append(is_filled)
-            pairs.append(k)
-        bends.append(total)
+        compliance.append(points.compliance)
+        slopes.append(rows.slopes)
+        gaps.append(rows.gaps)
+        filled.append(ca.vertcat(*(is_filled for *_, is_filled in points.points)) if points.points else ca.SX.ones(count))
+        bends.append(rows.bends)
+        curvature += rows.curvature
+        hollow_curvature += rows.hollow_curvature
     return Rows(
         slopes=ca.vertcat(ca.SX(0, system.z.numel()), *slopes),
         gaps=ca.vertcat(ca.SX(0, 1), *gaps),
@@ -168,17 +136,10 @@ def relative_poses(
 def spring_energy(system: GroupEquations, points_of_pairs: Sequence[RowPoints], poses: Sequence[Pose]) -> ca.SX:
     """Return the energy [N mm] of the compressed springs at `poses`; 0 without points."""
     energy = ca.SX(0)
-    for k, (X_RM, (points, compliance, _)) in enumerate(
-        zip(system.relative(poses), points_of_pairs, strict=bool(points_of_pairs))
-    ):
-        pair = system.nominal.pairs[system.group.pairs[k]]
-        springs = springs_of(compliance)
-        if springs and pair.round is not None:
-            no_reactions, no_increments = ca.SX(len(pair.round), 1), ca.SX(ENTRIES, 0)
-            gaps = ca.vertsplit(round_gaps(pair.round, X_RM.vector(), system.heights[k], no_reactions, no_increments).gaps)
-        else:
-            gaps = [gap(X_RM, P_m, P_r, n_r) for P_m, P_r, n_r, _ in points]
-        energy += sum((ca.fmin(gaps[row], 0) ** 2 / (2 * compliance[row]) for row in springs), ca.SX(0))
+    for k, (X_RM, points) in enumerate(zip(system.relative(poses), points_of_pairs, strict=bool(points_of_pairs))):
+        springs = springs_of(points.compliance)
+        gaps = pair_gaps(system.pair(k)).values(X_RM, system.heights[k], points) if springs else []
+        energy += sum((ca.fmin(gaps[row], 0) ** 2 / (2 * points.compliance[row]) for row in springs), ca.SX(0))
     return energy
 
 
@@ -196,7 +157,7 @@ def row_points(system: GroupEquations, standing: Sequence[np.ndarray | int], inp
         if isinstance(points, int):
             points_of_pairs.append(RowPoints(list(itertools.islice(slots, points)), ca.SX.zeros(points), next(bends)))
         else:
-            rows = [] if pair.round is not None else _standing_rows(pair, points, system.deviations)
+            rows = pair_gaps(pair).points(points, system.deviations)
             points_of_pairs.append(RowPoints(rows, ca.SX(ca.DM(compliance_of(pair)[points]))))
     return points_of_pairs
 
@@ -205,13 +166,3 @@ def slot_points(inputs: Mapping[str, ca.SX]) -> Iterator[Point]:
     """Return the points in the slots."""
     columns = (ca.horzsplit(values) for values in (inputs["P_m"], inputs["P_r"], inputs["n_r"], inputs["filled"].T))
     return iter(zip(*columns, strict=True))
-
-
-def _standing_rows(pair: ContactPoints, points: np.ndarray, deviations: ca.SX) -> list[Point]:
-    """Return points that always have a row: constants, except for the offsets that depend on deviations."""
-    P_m, P_r, n_r = (ca.SX(ca.DM(values[points].T)) for values in (pair.P_m, pair.P_r, pair.n_r))
-    offsets = pair.offsets.take(points)
-    if offsets.columns.size:
-        heights = ca.sparsify(ca.DM(offsets.matrix.T)) @ deviations[offsets.columns.tolist()]
-        P_r = P_r + n_r @ ca.diag(heights)
-    return list(zip(*(ca.horzsplit(values) for values in (P_m, P_r, n_r, ca.SX.ones(1, len(points)))), strict=True))

@@ -23,7 +23,7 @@ def with_flexibility(program: Program, parts: Sequence[PartFlexibility]) -> Prog
     for compiled in program.groups:
         counts = [row_count(points) for points in compiled.qp.standing]
         flexibility = group_flexibility(nominal, compiled.group, counts, parts)
-        qp = contact_qp(nominal, compiled.group, program.gaps, program.method, compiled.qp.standing, flexibility=flexibility)
+        qp = contact_qp(nominal, compiled.group, program.method, compiled.qp.standing, flexibility=flexibility)
         groups.append(ContactGroup(compiled.group, qp, ContactSolver(qp, program.solver)))
     entries, d = ca.SX.sym("poses", ENTRIES * len(nominal.parts)), ca.SX.sym("deviations", len(nominal.contributors))
     return replace(program, groups=tuple(groups), bending=bending, observe_bent=bent_measures(nominal, entries, d, bending))

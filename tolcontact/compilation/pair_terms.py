@@ -6,7 +6,6 @@ blocks is compiled as fast as a tower of six. Up to rounding, the results are eq
 quadratic_terms for the whole group (tests/units/compilation/test_pair_terms.py).
 """
 
-import pickle
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,13 +13,15 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.compilation.calls import Call
-from tolcontact.compilation.contact_rows import RowPoints, Rows, contact_rows, relative_poses
+from tolcontact.compilation.contact_rows import Rows, contact_rows, relative_poses
 from tolcontact.compilation.quadratic_terms import QuadraticTerms, quadratic_terms
 from tolcontact.mechanics.correction import FREEDOMS, Motion, linear
 from tolcontact.mechanics.displacement import MOMENTS
+from tolcontact.mechanics.gap import RowPoints
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.groups import Group
 from tolcontact.mechanics.objective import objective_scale
+from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.pose import Pose, poses_of
 from tolcontact.method import Method
 
@@ -120,13 +121,12 @@ class _Pair:
     def kind(self) -> Hashable:
         """What distinguishes its equations from the equations of other pairs, except for their inputs."""
         group, contact = self.group, self.system.nominal.pairs[self.group.pairs[0]]
-        round_points = () if contact.round is None else tuple(pickle.dumps(point) for point in contact.round)
         return (
             tuple(mobility.movers for mobility in group.mobilities),
             tuple(side.part for side in group.sides),
             tuple(None if part is None else group.position(part) for part in (contact.moving, contact.reference)),
             tuple(face is not None for face in self.system.faces[self.index]),
-            round_points,
+            pair_gaps(contact).key,
         )
 
     def inputs(self, points: RowPoints, poses: Sequence[Pose]) -> dict[str, ca.SX]:

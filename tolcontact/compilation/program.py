@@ -4,10 +4,12 @@ import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from tolcontact.arrays import Array, Float
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, Trial, allowed_depths, bounded_pairs
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp, row_count
 from tolcontact.compilation.contact_rows import MANY_SLOTS, SLOTS, standing_points
@@ -19,7 +21,7 @@ from tolcontact.compilation.solver import SolverChoice
 from tolcontact.compilation.solvers import solver_choice
 from tolcontact.compilation.station_program import StationProgram, station_programs
 from tolcontact.declaration.measure import Tape
-from tolcontact.discretization import ContactPoints, Nominal, RoundPoints, coordinates_in_words
+from tolcontact.discretization import ContactPoints, Nominal, coordinates_in_words
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.interference import Watch
 from tolcontact.limits import Limits
@@ -30,14 +32,13 @@ from tolcontact.mechanics.flexibility import (
     part_flexibilities,
     with_weights,
 )
-from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
-from tolcontact.mechanics.group_equations import face_heights, face_poses, facing_pose
+from tolcontact.mechanics.group_equations import face_poses, facing_pose
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
+from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.placement import raw_poses
 from tolcontact.mechanics.pose import ENTRIES, poses_of
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
-from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.method import Method
 from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured
@@ -63,8 +64,8 @@ class Program(Pictured):
     draws        the draws of all contributors
     place        deviations (realization, contributor) -> poses (realization, 12 * part)
     observe      poses, deviations -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
-    gaps         gaps of each pair at X_RM, which are affine in it; None for round faces
-    round_gaps   X_RM, deviations -> gaps (realization, point), distances (realization, point) by pair index
+    gaps         gaps of each pair at X_RM: a GapMap, or of points that follow from every pose the function
+                 X_RM, deviations -> gaps (realization, point), distances (realization, point)
     meetings     by pair index: where its bodies can touch, if fixed planes do not represent its reference face
     trials       by pair index: the trial that decided this; none unless the search is bounded
     groups       the contact QPs
@@ -84,8 +85,7 @@ class Program(Pictured):
     solver: SolverChoice
     place: NamedFunction
     observe: NamedFunction
-    gaps: tuple[GapMap | None, ...]
-    round_gaps: dict[int, NamedFunction]
+    gaps: tuple[Any, ...]
     meetings: dict[int, Meeting]
     trials: dict[int, Trial]
     groups: tuple[ContactGroup, ...]
@@ -133,6 +133,13 @@ class Program(Pictured):
             )
         return lines
 
+    def observed(
+        self, poses: Float[Array, "n ..."], deviations: Float[Array, "n contributor"]
+    ) -> tuple[Float[Array, "n measure"], Float[Array, "n pair 12"]]:
+        """Return the measures, and X_RM of every pair, at some poses."""
+        results = self.observe(poses=poses, deviations=deviations)
+        return results["measured"], results["relative"].reshape(len(poses), len(self.nominal.pairs), ENTRIES)
+
     def limits(self, measure: int) -> Limits:
         """Return the limits of a measure, given by index, with its accuracy."""
         nominal, accuracy = float(self.nominal_measures[measure]), float(self.accuracies[measure])
@@ -169,7 +176,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             check_forces(nominal, groups)
         watch = _watch(nominal, draws, place)
         meetings, trials = bounded_pairs(watch, groups, draws, place, observe, method)
-        gaps = tuple(None if pair.round else gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs)
+        gaps = [pair_gaps(pair).compiled(nominal.input_count) for pair in nominal.pairs]
         rows = [_rows(pair, gaps[k], trials[k] if k in meetings else None, method) for k, pair in enumerate(nominal.pairs)]
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         standing = [[rows[k] for k in group.pairs] for group in groups]
@@ -178,7 +185,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         qps = []
         for group, points in zip(groups, standing, strict=True):
             flexibility = group_flexibility(nominal, group, list(map(row_count, points)), elastic)
-            qps.append((group, contact_qp(nominal, group, gaps, method, points, flexibility=flexibility)))
+            qps.append((group, contact_qp(nominal, group, method, points, flexibility=flexibility)))
         return Program(
             nominal=nominal,
             draws=draws,
@@ -186,8 +193,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             solver=choice,
             place=place,
             observe=observe,
-            gaps=gaps,
-            round_gaps={k: _round_gaps(nominal, pair, pair.round) for k, pair in enumerate(nominal.pairs) if pair.round},
+            gaps=tuple(NamedFunction.dense(of_pair) if isinstance(of_pair, ca.Function) else of_pair for of_pair in gaps),
             meetings=meetings,
             trials=trials,
             groups=tuple(ContactGroup(group, qp, ContactSolver(qp, choice)) for group, qp in qps),
@@ -213,10 +219,9 @@ def _place(nominal: Nominal, deviations: ca.SX) -> NamedFunction:
 
 def _observe(nominal: Nominal, entries: ca.SX, deviations: ca.SX, values: Sequence[ca.SX]) -> NamedFunction:
     """Return the function of the measures, with these `values`, and of X_RM of each pair, see Program."""
-    poses = poses_of(entries)
-    pairs = [(pair, poses[pair.moving], None if pair.reference is None else poses[pair.reference]) for pair in nominal.pairs]
-    X_RM = [facing_pose(face_poses(pair, deviations), moving, reference).vector() for pair, moving, reference in pairs]
-    results = [ca.vertcat(*values), ca.vertcat(*X_RM)]
+    at = poses_of(entries).__getitem__
+    relative = (facing_pose(pair, face_poses(pair, deviations), at) for pair in nominal.pairs)
+    results = [ca.vertcat(*values), ca.vertcat(*(X_RM.vector() for X_RM in relative))]
     return NamedFunction.dense(
         ca.Function("observe", [entries, deviations], results, ["poses", "deviations"], ["measured", "relative"])
     )
@@ -227,15 +232,6 @@ def bent_measures(nominal: Nominal, entries: ca.SX, deviations: ca.SX, bending: 
     values = ca.vertcat(*measured(nominal, poses_of(entries), deviations, bending))
     inputs = {"poses": entries, "deviations": deviations, "loads": bending.loads}
     return NamedFunction.dense(ca.Function("observe_bent", [*inputs.values()], [values], [*inputs], ["measured"]))
-
-
-def _round_gaps(nominal: Nominal, pair: ContactPoints, points: RoundPoints) -> NamedFunction:
-    """Return the function of the gaps of round faces, see Program."""
-    X_RM, deviations = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("deviations", nominal.input_count)
-    results = round_gaps(points, X_RM, face_heights(pair, deviations), ca.SX(len(points), 1), ca.SX(ENTRIES, 0))
-    outputs = {"gaps": results.gaps, "distances": results.distances}
-    function = ca.Function("round_gaps", [X_RM, deviations], [*outputs.values()], ["X_RM", "deviations"], [*outputs])
-    return NamedFunction.dense(function)
 
 
 def _nominal_measures(nominal: Nominal, observe: NamedFunction) -> np.ndarray:
@@ -249,7 +245,7 @@ def _watch(nominal: Nominal, draws: Draws, place: NamedFunction) -> Watch:
     return Watch(nominal, {}, poses, deviations)
 
 
-def _rows(pair: ContactPoints, gaps: GapMap | None, trial: Trial | None, method: Method) -> np.ndarray | int:
+def _rows(pair: ContactPoints, gaps: Any, trial: Trial | None, method: Method) -> np.ndarray | int:
     """Return the points of a pair that always have a row, or the number of its slots; with the trial of a pair with a meeting.
 
     The contact points of a pair with a meeting change with every pose, so that none of them always has a row.

@@ -65,11 +65,7 @@ def _place(nominal: Nominal, station: str, pairs: np.ndarray, sources: np.ndarra
     placed = placed_poses(nominal, station, deviations, earlier)
     first = next(index for index, part in enumerate(nominal.parts) if part.station == station)
     relative = [
-        facing_pose(
-            face_poses(pair, deviations),
-            placed[pair.moving - first],
-            None if pair.reference is None else placed[pair.reference - first],
-        ).vector()
+        facing_pose(pair, face_poses(pair, deviations), lambda part: placed[part - first]).vector()
         for pair in (nominal.pairs[k] for k in pairs)
     ]
     results = [ca.vertcat(*(X.vector() for X in placed)), ca.vertcat(*relative) if relative else ca.SX(0, 1)]

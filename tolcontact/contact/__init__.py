@@ -3,7 +3,8 @@
 .. include:: ../guide/contact.md
 """
 
+from tolcontact.contact.candidates import pair_search
 from tolcontact.contact.resolver import ContactResolver
 from tolcontact.contact.state import Resolved
 
-__all__ = ["ContactResolver", "Resolved"]
+__all__ = ["ContactResolver", "Resolved", "pair_search"]

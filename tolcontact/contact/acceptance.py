@@ -46,8 +46,7 @@ class AcceptanceLimits:
         self._polyhedra = [k for k, pair in enumerate(self._group_pairs) if method.is_bounded and _is_polyhedron(pair)]
         self._round = {}
         for k in curved_pairs(nominal, group):
-            surface, points = self._group_pairs[k].reference_face, self._group_pairs[k].P_m
-            self._round[k] = (surface.curvature if surface is not None else 0.0, *_ball(points))
+            self._round[k] = (self._group_pairs[k].curvature, *_ball(self._group_pairs[k].P_m))
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
     def is_near(self, task: Task, state: State) -> Bool[Array, " n"]:
@@ -76,11 +75,11 @@ class AcceptanceLimits:
         """
         doubtful = self._is_turned(task, state)
         if not self._presses:
-            for k, places in candidates.bounded.items():
-                doubtful |= pose.turn(state.relative[:, k], task.relative[:, k]) > TURN_FACTOR * places.turn
+            for k, search in candidates.bounded.items():
+                doubtful |= pose.turn(state.relative[:, k], task.relative[:, k]) > TURN_FACTOR * search.meeting.turn
         far = self._is_far(task, state)
-        for k, places in candidates.bounded.items():
-            far |= ~places.reaches(state.relative[:, k])
+        for k, search in candidates.bounded.items():
+            far |= ~search.meeting.reaches(state.relative[:, k])
         rows = np.flatnonzero(far & ~doubtful & state.solved & ~state.in_conflict)
         travelled = state.take(rows)
         for k, index in enumerate(self._pairs):
@@ -97,8 +96,8 @@ class AcceptanceLimits:
                 pair, deviations = self._group_pairs[k], task.deviations[rows]
                 if pair.is_springy:  # compliant faces penetrate each other
                     continue
-                form = pair.form(deviations) if pair.has_form else None
-                doubtful[rows] |= faces.depth(X_RM, pair.heights(deviations), form) > self.allowed(k)
+                depth = faces.depth(X_RM, pair.heights(deviations), pair.form(deviations))
+                doubtful[rows] |= depth > self.allowed(k)
         return doubtful
 
     def lie_in_form(self, task: Task, state: State) -> Bool[Array, " n"]:

@@ -12,10 +12,10 @@ from tolcontact.contact.guard import PARTING, Guard, is_guard, no_places
 from tolcontact.contact.scan import PENETRATION, Deepest, Scan
 from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
 from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
-from tolcontact.geometry.meeting import NEARNESS, Meeting
+from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting
-from tolcontact.geometry.places import RaisedPlaces, unraised
+from tolcontact.geometry.places import Look, RaisedPlaces, unraised
 
 MAX_DEEPEST = MANY_SLOTS  # places of a pair that get a row in one round
 ALIGNED = 0.87  # cosine of the largest angle between the axis of separation and the normal of a penetrating place that counts
@@ -131,15 +131,13 @@ def bounded_scan(
     meeting: Meeting,
     X_RM: Float[Array, "n 12"],
     deviations: Float[Array, "n contributor"],
-    kept: Int[Array, "n k"] | None = None,
-    error: float = 0.0,
-    nearness: float = NEARNESS,
-    depth: float = np.inf,
-    guard: Guard | None = None,
-    parting: Parting | None = None,
-    former_labels: Int[Array, "n slot"] | None = None,
-    deepest: Float[Array, " n"] | None = None,
-    ceilings: Float[Array, " n"] | None = None,
+    look: Look,
+    *,
+    depth: float,
+    deepest: Float[Array, " n"] | None,
+    guard: Guard | None,
+    parting: Parting | None,
+    former_labels: Int[Array, "n slot"] | None,
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see raised_places for the other arguments.
 
@@ -148,7 +146,7 @@ def bounded_scan(
     `former_labels` (n, slot) are of places that were active before, -1 for none. Places deeper than `deepest` (n,) [mm] do
     not count.
     """
-    raised = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness, depth, ceilings)
+    raised = raised_places(pair, meeting, X_RM, deviations, look, depth)
     if deepest is not None:
         raised = raised.only(raised.gaps >= -deepest[:, None])
     if guard is not None:

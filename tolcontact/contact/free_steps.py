@@ -1,6 +1,6 @@
 """Steps of free bodies: each step ends before bodies penetrate, so that no constraints contradict each other."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +9,11 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.fixed_search import Search
 from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import min_gaps
 from tolcontact.contact.starts import FREE_WHERE_RAW, STRIDE
 from tolcontact.contact.state import State, Task
-from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics import Group
 
 MAX_HALVINGS = 20
@@ -33,13 +33,12 @@ class FreeSteps:
     def __init__(
         self,
         group: Group,
-        pairs: Sequence[ContactPoints],
         candidates: Candidates,
         limits: AcceptanceLimits,
         relate: Callable[..., np.ndarray],
         energy: Callable[[Task, State], np.ndarray],
     ) -> None:
-        self._group, self._pairs, self._candidates, self._limits = group, pairs, candidates, limits
+        self._group, self._candidates, self._limits = group, candidates, limits
         self._relate, self._energy = relate, energy
         self._centres = np.array([np.asarray(mobility.centre, dtype=float).ravel() for mobility in group.mobilities])
 
@@ -52,7 +51,8 @@ class FreeSteps:
         rows = np.flatnonzero(is_short)
         if rows.size:
             part, held = task.take(rows), state.take(rows)
-            scans = self._candidates.scans(held.relative, part.deviations, slots=held.slots, width=1.0, start=FREE_WHERE_RAW)
+            search = Search(FREE_WHERE_RAW, width=1.0)
+            scans = self._candidates.scans(held.relative, part.deviations, search, slots=held.slots)
             part = replace(part, raw=held.poses, relative=held.relative, scans=scans)
             freed = held.take(np.arange(len(rows)))
             size_of_rows, _ = step.take(part, freed, stride=STRIDE)
@@ -100,7 +100,7 @@ class FreeSteps:
                 rows = np.flatnonzero(guard.interferes(relative[:, k]))
                 if not rows.size:
                     continue
-                is_free, way, pair = False, guard.ways_out(relative[rows, k]), self._pairs[k]
+                is_free, way, pair = False, guard.ways_out(relative[rows, k]), self._candidates.pairs[k].pair
                 assert pair.reference is not None
                 sides = self._group.position(pair.moving), self._group.position(pair.reference)
                 normals = np.einsum("nij,nj->ni", pose.rotation(poses[rows, sides[1]]), way.normals)
@@ -118,7 +118,7 @@ class FreeSteps:
 
     def _depths(self, task: Task, relative: np.ndarray, deepest: np.ndarray) -> np.ndarray:
         """Return the largest penetration (n,) [mm] of the places that are not deeper than `deepest` (n,) [mm]."""
-        scans = self._candidates.scans(relative, task.deviations, start=FREE_WHERE_RAW, deepest=deepest)
+        scans = self._candidates.scans(relative, task.deviations, Search(FREE_WHERE_RAW, deepest=deepest))
         return np.maximum(-min_gaps(scans, relative, task.deviations).min(axis=1), 0)
 
 

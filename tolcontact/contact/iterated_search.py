@@ -12,6 +12,7 @@ import numpy as np
 
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.fixed_search import Search
 from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import min_gaps, undone
 from tolcontact.contact.slots import Slots
@@ -43,7 +44,7 @@ def search(
         size, scaled = step.take(unsettled.task, unsettled.state, stride=start.stride, caution=cautions)
         energy = energy_of(unsettled.task, unsettled.state)
         gain_ratio = (last_energy - energy) / np.maximum(scaled**2 / 2, 1e-300)  # relative to the gain that the QP predicts
-        scans = candidates.scans(unsettled.state.relative, unsettled.task.deviations, start=start)
+        scans = candidates.scans(unsettled.state.relative, unsettled.task.deviations, Search(start))
         # A step whose points are deeper inside afterwards only gains what is lost again later.
         sinks = _depth_left(scans, unsettled) > np.maximum((1 - GOOD_RATIO) * np.minimum(size, scaled), STEP_TOLERANCE)
         stalls = (size > GOOD_RATIO * last_size) & (gain_ratio < 1 - GOOD_RATIO) | sinks

@@ -45,7 +45,7 @@ class LinearStep:
         self._slots = {k: points for k, points in enumerate(group.qp.standing) if isinstance(points, int)}
         self.varying = list(self._slots)
         # The curvature of walls around round faces counts in every step, not in Newton's alone.
-        self.knows_walls = any(program.nominal.pairs[pair].round for pair in group.group.pairs)
+        self.knows_walls = not all(program.nominal.pairs[pair].samples_faces for pair in group.group.pairs)
 
     def twin(self) -> "LinearStep":
         """Return the same step for another thread."""

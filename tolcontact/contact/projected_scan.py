@@ -9,7 +9,6 @@ from scipy.spatial import KDTree
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.scan import Deepest, FixedScan, Scan
-from tolcontact.discretization import ContactPoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +32,10 @@ class ProjectedScan(Scan):
     ) -> Float[Array, "realization point"]:
         """Return gaps (realization, point) [mm], infinite for points beyond the rim."""
         fixed, n = self.fixed, self.normals
-        offset = pose.apply(relative, fixed.P_m) - self.feet
+        offset = pose.apply(relative, fixed.pair.P_m) - self.feet
         gaps = n[..., 0] * offset[..., 0] + n[..., 1] * offset[..., 1] + n[..., 2] * offset[..., 2]
-        if fixed.columns.size:
-            gaps -= fixed.offsets.heights(deviations, np.broadcast_to(np.arange(len(fixed.P_m)), gaps.shape))
+        if fixed.points.columns.size:
+            gaps -= fixed.pair.offsets.heights(deviations, np.broadcast_to(np.arange(len(fixed.pair.P_m)), gaps.shape))
         return np.where(self.over, gaps, np.inf)
 
     def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
@@ -46,15 +45,15 @@ class ProjectedScan(Scan):
         gaps = np.minimum(self.gaps(relative, deviations), 0)
         if may_carry is not None:
             gaps = np.where(may_carry, gaps, 0)
-        firsts = self.fixed.leaves[self.fixed.branches[self.fixed.clusters]]
+        firsts = self.fixed.points.leaves[self.fixed.points.branches[self.fixed.clusters]]
         points = np.stack([gaps[:, a:b].argmin(axis=1) + a for a, b in itertools.pairwise(firsts)], axis=1)
         return Deepest(points, -np.take_along_axis(gaps, points, axis=1))
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         feet, normals = (np.take_along_axis(values, points[..., None], axis=1) for values in (self.feet, self.normals))
-        if self.fixed.columns.size:
-            feet = feet + self.fixed.offsets.heights(deviations, points)[..., None] * normals
-        return self.fixed.P_m[points], feet, normals
+        if self.fixed.points.columns.size:
+            feet = feet + self.fixed.pair.offsets.heights(deviations, points)[..., None] * normals
+        return self.fixed.pair.P_m[points], feet, normals
 
 
 def half_spacing(P_m: Float[Array, "point 3"]) -> float:
@@ -65,17 +64,17 @@ def half_spacing(P_m: Float[Array, "point 3"]) -> float:
     return float(np.median(distance[:, 1])) / 2
 
 
-def project(scan: FixedScan, pair: ContactPoints, relative: Float[Array, "realization 12"], margin: float) -> Scan:
+def project(scan: FixedScan, relative: Float[Array, "realization 12"], margin: float) -> Scan:
     """Return the scan of a pair with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
 
     Points that overhang the rim by up to `margin` [mm] still count, so that points at the rim do not appear and
     vanish with every step.
     """
-    surface = pair.reference_face
+    surface = scan.pair.reference_face
     if surface is None:
         return scan
-    shape = (len(relative), len(scan.P_m), 3)
-    feet, normals, over = surface.project(pose.apply(relative, scan.P_m).reshape(-1, 3), margin=margin)
-    if pair.coordinate_error:
-        feet = feet - pair.coordinate_error * normals
+    shape = (len(relative), len(scan.pair.P_m), 3)
+    feet, normals, over = surface.project(pose.apply(relative, scan.pair.P_m).reshape(-1, 3), margin=margin)
+    if scan.pair.coordinate_error:
+        feet = feet - scan.pair.coordinate_error * normals
     return ProjectedScan(scan, feet.reshape(shape), normals.reshape(shape), over.reshape(shape[:2]))

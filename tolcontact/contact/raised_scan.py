@@ -47,7 +47,7 @@ class RaisedScan(Scan):
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         is_point, realization = points < FIRST_PLACE, self.raised.rows[:, None]
         numbers = np.where(is_point, points, 0)
-        P_m, P_r, n_r = self.nominal.P_m[numbers], self.nominal.P_r[numbers], self.nominal.n_r[numbers]
+        P_m, P_r, n_r = (x[numbers] for x in (self.nominal.pair.P_m, self.nominal.pair.P_r, self.nominal.pair.n_r))
         P_r = P_r - self.raised.points[realization, numbers][..., None] * n_r
         if not is_point.all():
             both = zip((P_m, P_r, n_r), self.minima.rows(points), strict=True)
@@ -95,7 +95,8 @@ class RaisedScan(Scan):
             return replace(self, minima=every)
         grown, limits = pair.heights(deviations), pair.minima.bulge(deviations)
         gaps = self.nominal.gaps(relative, deviations, limits, raised=self.raised)
-        labels = pair.minima.find(relative, deviations, grown, self.nominal.P_m[None], gaps, limits, depth, in_steps=in_steps)
+        P_m = self.nominal.pair.P_m[None]
+        labels = pair.minima.find(relative, deviations, grown, P_m, gaps, limits, depth, in_steps=in_steps)
         labels = with_former(labels, self.minima.labels)
         if not labels.shape[1]:
             return replace(self, minima=SearchedPlaces.none(len(relative)))
@@ -105,13 +106,12 @@ class RaisedScan(Scan):
 
 def raised_scan(scan: FixedScan, deviations: Float[Array, "realization contributor"], *, always: bool = False) -> Scan:
     """Return the scan of realizations with deviations; without many heights the same one, unless `always`."""
-    if len(scan.columns) < MIN_HEIGHTS and not always:
+    of, count = scan.points, len(deviations)
+    if len(of.columns) < MIN_HEIGHTS and not always:
         return scan
-    count = len(deviations)
-    points, leaves, branches = (
-        np.empty((count, size)) for size in (len(scan.P_m), len(scan.leaves) - 1, len(scan.branches) - 1)
-    )
+    sizes = of.coordinates.shape[1], len(of.leaves) - 1, len(of.branches) - 1
+    points, leaves, branches = (np.empty((count, size)) for size in sizes)
     raised = kernel.Raised(points, leaves, branches, np.arange(count))
-    slopes, heights = scan.coordinates[scan.basis.shape[1] :], np.ascontiguousarray(deviations)
-    kernel.sum_heights(scan.columns, slopes, scan.leaves, scan.branches, heights, raised)
+    slopes, heights = of.coordinates[of.basis.shape[1] :], np.ascontiguousarray(deviations)
+    kernel.sum_heights(of.columns, slopes, of.leaves, of.branches, heights, raised)
     return RaisedScan(scan, raised, SearchedPlaces.none(count))

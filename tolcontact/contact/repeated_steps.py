@@ -13,6 +13,7 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.fixed_search import Search
 from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.linear_step import LinearStep, Step
 from tolcontact.contact.progress import Progress
@@ -33,7 +34,7 @@ class Phase(NamedTuple):
 
     newton     whether they count curvature
     firmness   weight of the regularization of freedoms that the objective leaves open
-    width      how wide edges are taken (see Candidates.scans)
+    width      how wide edges are taken (see Search)
     sharp      whether edges are sharp after a step, for realizations that have nearly converged
     """
 
@@ -140,11 +141,9 @@ def repeat(
 def _find_places(candidates: Candidates, unsettled: Unsettled, phase: Phase, size: Float[Array, " n"], start: Start) -> None:
     """Find the contact places at the poses of unsettled realizations, after steps of a size (n,) [mm]."""
     task = unsettled.task
-    scans = candidates.scans(
-        unsettled.state.relative, task.deviations, slots=unsettled.state.slots, width=phase.width,
-        at_rest=(size < NEARLY_AT_REST) & phase.sharp, earlier=task.scans, start=start,
-        ceilings=None if start.free else candidates.ceiling + OUTLOOK * size,
-    )  # fmt: skip
+    ceilings = None if start.free else candidates.ceiling + OUTLOOK * size
+    search = Search(start, phase.width, at_rest=(size < NEARLY_AT_REST) & phase.sharp, ceilings=ceilings)
+    scans = candidates.scans(unsettled.state.relative, task.deviations, search, slots=unsettled.state.slots, earlier=task.scans)
     unsettled.task = replace(task, scans=scans)
 
 

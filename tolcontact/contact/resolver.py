@@ -15,12 +15,13 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
 from tolcontact.contact.acceptance import MAX_TURN, AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.fixed_search import Search
 from tolcontact.contact.free_steps import FreeSteps
 from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, LinearStep
 from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
-from tolcontact.contact.scan import PENETRATION, RoundScan, Scan, min_gaps, undone
+from tolcontact.contact.scan import PENETRATION, min_gaps, undone
 from tolcontact.contact.starts import FIRST, RESCUES, Start
 from tolcontact.contact.state import Outcome, Resolved, State, Task
 from tolcontact.discretization import ContactPoints
@@ -51,9 +52,7 @@ class ContactResolver:
         self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
         self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size, max_turn)
-        self._free_steps = FreeSteps(
-            group.group, self.contact_points, self._candidates, self._limits, self._relate, self._energy_of
-        )
+        self._free_steps = FreeSteps(group.group, self._candidates, self._limits, self._relate, self._energy_of)
 
     def twin(self) -> "ContactResolver":
         """Return the same resolver for another thread."""
@@ -143,10 +142,8 @@ class ContactResolver:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = start.projected
         self._leave_adrift(task, state)
-        scans = self._candidates.scans(
-            state.relative, task.deviations, earlier=task.scans, start=start, slots=state.slots,
-            ceilings=None if start.free else np.full(len(state), self._candidates.ceiling),
-        )  # fmt: skip
+        at_rest = Search(start, ceilings=None if start.free else np.full(len(state), self._candidates.ceiling))
+        scans = self._candidates.scans(state.relative, task.deviations, at_rest, slots=state.slots, earlier=task.scans)
         task = replace(task, scans=scans)
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
@@ -168,7 +165,8 @@ class ContactResolver:
         openings = None if flexibility is None else flexibility.openings(state.multipliers)
         for k in self._springy:
             pair, span = self.contact_points[k], self.spans[k]
-            gaps, reactions = point_gaps(pair, task.scans[k], state.relative[:, k], task.deviations), state.multipliers[:, span]
+            gaps = self._candidates.pairs[k].gaps(state.relative[:, k], task.deviations)
+            reactions = state.multipliers[:, span]
             if flexibility is None or openings is None:
                 misfit = spring_misfit(pair, gaps, reactions)
             else:
@@ -190,7 +188,8 @@ class ContactResolver:
             rolled = np.flatnonzero(self._limits.rolled(k, state))
             if rolled.size:
                 relative = state.relative[rolled, k]
-                depth = -self._candidates.projected(k, relative).min_gap(relative, task.deviations[rolled])
+                scan = self._candidates.pairs[k].projected(relative)
+                depth = -scan.min_gap(relative, task.deviations[rolled])
                 state.doubtful[rolled] |= depth > self._limits.allowed(k)
 
     def _rescue(self, task: Task, state: State, raw_gap: Float[Array, "n pair"]) -> None:
@@ -239,7 +238,7 @@ class ContactResolver:
             poses, relative = state.poses[rows], state.relative[rows]
         if start.free:
             poses, relative = self._free_steps.lift(poses, relative, part.deviations)
-        part = replace(part, scans=self._candidates.scans(relative, part.deviations, start=start))
+        part = replace(part, scans=self._candidates.scans(relative, part.deviations, Search(start)))
         attempt = self._step.start(poses, relative)
         self._attempt(part, attempt, start)
         accumulate_starts(state, rows, attempt)
@@ -286,16 +285,6 @@ def is_same_conflict(state: State, best: State) -> Bool[Array, " n"]:
     depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
     goes_as_deep = np.abs(depth - best_depth) <= SAME_CONFLICT * np.maximum(depth, best_depth)
     return (state.outcome == Outcome.IN_CONFLICT) & (best.outcome == Outcome.IN_CONFLICT) & goes_as_deep
-
-
-def point_gaps(
-    pair: ContactPoints, scan: Scan, relative: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]
-) -> Float[Array, "n point"]:
-    """Return the gaps (n, point) [mm] of all points of a pair between rigid bodies at X_RM `relative` (n, 12)."""
-    if isinstance(scan, RoundScan):
-        return scan.gaps(relative, deviations)
-    points = np.broadcast_to(np.arange(len(pair.P_m)), (len(relative), len(pair.P_m)))
-    return pair.nominal_gaps(relative) - pair.offsets.heights(deviations, points)
 
 
 def spring_misfit(pair: ContactPoints, gaps: Float[Array, "n point"], reactions: Float[Array, "n point"]) -> Float[Array, " n"]:

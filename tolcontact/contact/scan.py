@@ -13,9 +13,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.compilation import NamedFunction
 from tolcontact.contact import kernel
-from tolcontact.discretization import ContactPoints, Offsets
+from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics import MOMENTS, GapMap
 
 PENETRATION = 1e-10  # mm: less than this is no penetration
@@ -23,13 +22,6 @@ BOUND_TOLERANCE = 1e-12  # of the largest coordinate: bounds of leaves are that 
 OUTSIDE = 1e300  # a coordinate that no point has
 NOTHING = np.empty((0, 0))
 NOT_RAISED = kernel.Raised(NOTHING, NOTHING, NOTHING, np.empty(0, dtype=np.int64))
-
-
-class Survey(NamedTuple):
-    """The number of active points of a pair (realization,), and their moments (realization, side, moment)."""
-
-    active: Int[Array, " realization"]
-    moments: Float[Array, "realization side moment"]
 
 
 class Deepest(NamedTuple):
@@ -84,59 +76,19 @@ class Scan:
 
 
 @dataclass(frozen=True, eq=False)
-class RoundScan(Scan):
-    """The points of round faces, which follow from every pose. They always have a row of the QP; no row is searched for.
-
-    tables     moment tables (moment, point) of the sides that enter the objective
-    gaps_at    X_RM, deviations -> gaps (realization, point)
-    """
-
-    tables: tuple[Float[Array, "moment point"], ...]
-    gaps_at: NamedFunction
-
-    def gaps(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
-    ) -> Float[Array, "realization point"]:
-        """Return gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, contributor)."""
-        return self.gaps_at(X_RM=relative, deviations=deviations)["gaps"]
-
-    def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        return self.gaps(relative, deviations).min(axis=1)
-
-    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> Survey:
-        """Return number and moments of the points whose gap is below `activity` [mm]."""
-        active = self.gaps(relative, deviations) < activity
-        sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
-        moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
-        return Survey(active.sum(axis=1), moments)
-
-
-@dataclass(frozen=True, eq=False)
 class FixedScan(Scan):
     """Fixed contact points of a pair, sorted by cluster; and within a cluster into branches and leaves of neighbours.
 
-    tables             moment tables (moment, point) of the sides that enter the objective
-    basis              (13, r),
-    columns            (k,), and
-    coordinates        (r + k, point): gaps [mm] = [[X_RM, 1] @ basis, deviations[columns]] @ coordinates
-    P_m, P_r, n_r      (point, 3), nominal
-    offsets            of the points
-    leaves             (leaf + 1,): the first point of each leaf, and the end
-    branches           (branch + 1,): the first leaf of each branch, and the end
-    clusters           (cluster + 1,): the first branch of each cluster, and the end
+    pair       with its points in this order
+    points     as compiled passes take them
+    clusters   (cluster + 1,): the first branch of each cluster, and the end
+    tables     moment tables (moment, point) of the sides that enter the objective
     """
 
-    tables: tuple[Float[Array, "moment point"], ...]
-    basis: Float[Array, "entry r"]
-    columns: Int[Array, " k"]
-    coordinates: Float[Array, "coordinate point"]
-    P_m: Float[Array, "point 3"]
-    P_r: Float[Array, "point 3"]
-    n_r: Float[Array, "point 3"]
-    offsets: Offsets
-    leaves: Int[Array, " _"]
-    branches: Int[Array, " _"]
+    pair: ContactPoints
+    points: kernel.Points
     clusters: Int[Array, " _"]
+    tables: tuple[Float[Array, "moment point"], ...]
 
     def gaps(
         self,
@@ -150,29 +102,29 @@ class FixedScan(Scan):
 
         raised   the heights of the points, if they are known; otherwise they follow from the deviations
         """
-        gaps = np.empty((len(relative), len(self.P_m)))
+        gaps = np.empty((len(relative), len(self.pair.P_m)))
         limits = np.full(len(relative), np.inf) if limits is None else limits
         kernel.write_gaps(*self._inputs(relative, deviations, raised), limits, gaps)
         return gaps
 
     def survey(
         self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"], activity: float
-    ) -> Survey:
-        """Return number and moments of the points whose gap is below `activity` [mm]."""
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return number (realization,) and moments (realization, side, moment) of points whose gap is below `activity` [mm]."""
         count = len(relative)
         active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
         flat = moments.reshape(count, self._table.shape[1])
         kernel.survey(self.points, self._table, *self._sums, poses, heights, activity, active, flat)
-        return Survey(active, moments)
+        return active, moments
 
     def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         return self.deepest_of(self.clusters[[0, -1]], relative, deviations)[1][:, 0]
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        P_m, P_r, n_r = self.P_m[points], self.P_r[points], self.n_r[points]
-        if self.columns.size:
-            P_r = P_r + self.offsets.heights(deviations, points)[..., None] * n_r
+        P_m, P_r, n_r = self.pair.P_m[points], self.pair.P_r[points], self.pair.n_r[points]
+        if self.points.columns.size:
+            P_r = P_r + self.pair.offsets.heights(deviations, points)[..., None] * n_r
         return P_m, P_r, n_r
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
@@ -210,32 +162,26 @@ class FixedScan(Scan):
         return points, raised or NOT_RAISED, np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
 
     @cached_property
-    def points(self) -> kernel.Points:
-        """The points as compiled passes take them."""
-        rounding = BOUND_TOLERANCE * np.abs(self.coordinates[1:]).max(initial=0)
-        boxes = []
-        for starts in (self.leaves[:-1], self.leaves[self.branches[:-1]]):
-            low, high = (extreme.reduceat(self.coordinates[1:], starts, axis=1) for extreme in (np.minimum, np.maximum))
-            boxes.append(np.stack([(low + high) / 2, (high - low) / 2 + rounding]))
-        return kernel.Points(self.basis, self.columns, self.coordinates, self.leaves, self.branches, *boxes)
-
-    @cached_property
     def _nominal_points(self) -> kernel.Points:
         """The points without the heights that deviations add."""
-        points, size = self.points, self.basis.shape[1]
-        boxes = (np.ascontiguousarray(boxes[:, : size - 1]) for boxes in (points.leaf_boxes, points.branch_boxes))
-        return kernel.Points(self.basis, self.columns[:0], self.coordinates[:size], self.leaves, self.branches, *boxes)
+        points, size = self.points, self.points.basis.shape[1]
+        leaf_boxes, branch_boxes = (
+            np.ascontiguousarray(boxes[:, : size - 1]) for boxes in (points.leaf_boxes, points.branch_boxes)
+        )
+        return points._replace(
+            columns=points.columns[:0], coordinates=points.coordinates[:size], leaf_boxes=leaf_boxes, branch_boxes=branch_boxes
+        )
 
     @cached_property
     def _table(self) -> np.ndarray:
         """What each point adds to the moments (point, side * moment)."""
-        return np.ascontiguousarray(np.array(self.tables).reshape(len(self.tables) * MOMENTS, len(self.P_m)).T)
+        return np.ascontiguousarray(np.array(self.tables).reshape(len(self.tables) * MOMENTS, len(self.pair.P_m)).T)
 
     @cached_property
     def _sums(self) -> tuple[np.ndarray, np.ndarray]:
         """Summed moments of the leaves and of the branches, (leaf, side * moment) and (branch, side * moment)."""
-        of_leaves = np.add.reduceat(self._table, self.leaves[:-1], axis=0)
-        return of_leaves, np.add.reduceat(of_leaves, self.branches[:-1], axis=0)
+        of_leaves = np.add.reduceat(self._table, self.points.leaves[:-1], axis=0)
+        return of_leaves, np.add.reduceat(of_leaves, self.points.branches[:-1], axis=0)
 
 
 def pair_scan(
@@ -255,18 +201,18 @@ def pair_scan(
     order = np.concatenate(leaves)
     ends = np.cumsum([0, *map(len, leaves_of_clusters)])
     firsts = [np.arange(begin, end, kernel.BRANCH) for begin, end in itertools.pairwise(ends)]
+    coordinates = np.ascontiguousarray(gaps.coordinates[:, order])
+    rounding = BOUND_TOLERANCE * np.abs(coordinates[1:]).max(initial=0)
+    starts, branches = np.cumsum([0, *map(len, leaves)]), np.concatenate([*firsts, [len(leaves)]])
+    boxes = []
+    for first in (starts[:-1], starts[branches[:-1]]):
+        low, high = (extreme.reduceat(coordinates[1:], first, axis=1) for extreme in (np.minimum, np.maximum))
+        boxes.append(np.stack([(low + high) / 2, (high - low) / 2 + rounding]))
     return FixedScan(
-        basis=gaps.basis,
-        columns=gaps.columns,
-        coordinates=np.ascontiguousarray(gaps.coordinates[:, order]),
-        tables=tuple(np.ascontiguousarray(table[:, order]) for table in tables),
-        P_m=pair.P_m[order],
-        P_r=pair.P_r[order],
-        n_r=pair.n_r[order],
-        offsets=pair.offsets.take(order),
-        leaves=np.cumsum([0, *map(len, leaves)]),
-        branches=np.concatenate([*firsts, [len(leaves)]]),
+        pair.take(order),
+        kernel.Points(gaps.basis, gaps.columns, coordinates, starts, branches, *boxes),
         clusters=np.cumsum([0, *map(len, firsts)]),
+        tables=tuple(np.ascontiguousarray(table[:, order]) for table in tables),
     )
 
 

@@ -3,12 +3,14 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import trimesh
 
 from tolcontact.declaration import Assembly, ContactPair, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
+from tolcontact.discretization.fixed_contact import ContactPoints
 from tolcontact.discretization.form_points import (
     affordable_spacing,
     check_facing,
@@ -20,11 +22,9 @@ from tolcontact.discretization.form_points import (
     with_rims,
 )
 from tolcontact.discretization.locators import Locators, NominalPart
-from tolcontact.discretization.nominal import ContactPoints
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.retained_nodes import retained_nodes
-from tolcontact.discretization.round_contact import round_points
-from tolcontact.discretization.round_points import RoundPoints
+from tolcontact.discretization.round_contact import RoundContact
 from tolcontact.discretization.scenes import Scene
 from tolcontact.errors import GeometryFault
 from tolcontact.features import Features
@@ -39,8 +39,8 @@ from tolcontact.geometry.triangle_mesh import coordinate_error
 DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
 FORM_POINTS = 10_000  # with form, if that resolves it
-MIN_SHARE = 1e-3  # of the mean share of a point in the stiffness of a pair
 DEFAULT_SPRINGS = 40  # which may all be active at once, so that a QP has a row for each
+KINDS = (RoundContact,)  # of contact between faces, if the model leaves the choice open; other faces have fixed points
 
 
 def contact_points(
@@ -65,14 +65,23 @@ def contact_points(
         unplaced, moving_face = unplaced.part(triangles), moving_face.part(triangles)
         reference_face = reference_face.part(facing_triangles(reference_face, moving_face, deviating[0]))
         check_facing(moving_face, reference_face, deviating)
-    balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) and not lengths else []
-    # A hollow wall is fitted to many vertices: rounding hardly moves it.
-    is_rounded = not any(point.is_hollow for point in balls_and_shafts)
-    rounding = coordinate_error(moving.mesh) + coordinate_error(reference.mesh) if is_rounded else 0.0
-    undetected = None
-    if balls_and_shafts:
-        P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
-    else:
+    rounding = coordinate_error(moving.mesh) + coordinate_error(reference.mesh)
+    common: dict[str, Any] = {
+        "name": pair.name,
+        "moving": scene.index(moving.part),
+        "reference": scene.index(reference.part),
+        "reference_face": reference_face,
+        "moving_face": moving_face,
+        "within": reach,
+        "facets": facet_error(moving_face, reference_face, reach),
+        "deviating": deviating,
+        "elastic": _bends(pair),
+    }
+    points: ContactPoints | None = None
+    for kind in KINDS if _is_open(pair) and not lengths else ():
+        points = points or kind.between(moving_face, reference_face, reach, rounding, common)
+    if points is None:
+        undetected = None
         candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
         if candidates is None and _is_open(pair):
             candidates = retained_nodes((moving, reference), moving_face)
@@ -80,46 +89,16 @@ def contact_points(
             faces = moving_face, reference_face
             candidates, undetected = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths)
         P_m, P_r, n_r = _touching(pair, candidates, moving_face, reference_face, reach)
-    points = ContactPoints(
-        name=pair.name,
-        moving=scene.index(moving.part),
-        reference=scene.index(reference.part),
-        P_m=P_m,
-        P_r=P_r - rounding * n_r if rounding else P_r,
-        n_r=n_r,
-        offsets=Offsets.joined([], len(P_m)),
-        reference_face=reference_face,
-        moving_face=moving_face,
-        within=reach,
-        coordinate_error=rounding,
-        facets=facet_error(moving_face, reference_face, reach),
-        sampling_error=undetected,
-        round=RoundPoints.of(balls_and_shafts) if balls_and_shafts else None,
-        deviating=deviating,
-        elastic=_bends(pair),
-    )
-    if pair.stiffness is not None:
-        points = replace(points, stiffness=pair.stiffness * _spring_shares(points))
-    if balls_and_shafts or not any(deviating):
-        return points
-    return replace(points, offsets=height_offsets(points))
-
-
-def _spring_shares(points: ContactPoints) -> np.ndarray:
-    """Return the share (point,) of each contact point in the stiffness of its pair.
-
-    Raises GeometryFault for a curved face, which has no nominal area of contact.
-    """
-    assert points.moving_face is not None and points.reference_face is not None
-    if points.round is not None:
-        return np.where(points.round.points["axis"].any(axis=1), 0.5, 1.0)  # a shaft has two ends
-    if not (points.moving_face.is_flat and points.reference_face.is_flat):
-        raise GeometryFault("it has a stiffness, which needs flat faces, or a ball or shaft against walls; leave stiffness out")
-    shares = points.weights / len(points.P_m)
-    if shares.min() >= MIN_SHARE / len(shares):
-        return shares
-    shares = np.maximum(shares, MIN_SHARE / len(shares))  # a corner may represent no area
-    return shares / shares.sum()
+        points = ContactPoints(
+            P_m=P_m,
+            P_r=P_r - rounding * n_r if rounding else P_r,
+            n_r=n_r,
+            offsets=Offsets.joined([], len(P_m)),
+            coordinate_error=rounding,
+            sampling_error=undetected,
+            **common,
+        ).with_heights()
+    return points if pair.stiffness is None else replace(points, stiffness=pair.stiffness * points.stiffness_shares())
 
 
 def _bends(pair: ContactPair) -> bool:
@@ -198,17 +177,6 @@ def _touching(
     return P_m[is_touching], P_r[is_touching], n_r[is_touching]
 
 
-def height_offsets(points: ContactPoints) -> Offsets:
-    """Return the heights of the points from sizes and forms; heights of the moving face count along the reference normal."""
-    offsets, facing = list[Offsets](), points.facing
-    for face, share, P in zip(points.deviating, (facing, np.ones_like(facing)), (points.P_m, points.P_r), strict=True):
-        if face is not None and face.grows:
-            offsets.append(Offsets(face.columns[face.height != 0], np.outer(face.height[face.height != 0], share)))
-        if face is not None and face.form is not None:
-            offsets.append(Offsets(face.form_columns, face.form.heights(P).T * share))
-    return Offsets.joined(offsets, len(facing))
-
-
 def _check_number(points: float, subject: str) -> None:
     """Raise GeometryFault if there are too many contact points."""
     if points > MAX_POINTS:
@@ -234,51 +202,46 @@ def _with_curvature(
 
 
 def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> Iterator[ContactPoints]:
-    """Yield the one-sided locators of each free part, or of each part of a free joint, as a contact pair; then its springs."""
+    """Yield the one-sided locators of each free part, or of each part of a free joint, as a contact pair.
+
+    Two-sided locators that hold an elastic part follow, each a pair of one point, which pushes and pulls; then compliant ones.
+    """
     start = 0
     for index, part in enumerate(parts):
-        owners = np.array(part.owners or (index,) * len(part.locators), dtype=int)
-        for owner in np.unique(owners[part.locators.one_sided]) if part.free else ():
-            supports = np.flatnonzero(part.locators.one_sided & (owners == owner))
-            P, n = part.locators.points[supports], part.locators.directions[supports]
-            offsets = _support_offsets(part.locators, start, supports)
-            scene = next(scene for scene in scenes if scene.station == part.station)
-            name = scene.supports_name(parts[owner].part)
-            stiffness = np.where(part.locators.springy, part.locators.stiffness, np.inf)[supports]
-            numbers = start + supports
-            yield ContactPoints(
-                name, int(owner), part.parent, P, P, n, offsets, locators=numbers, stiffness=stiffness,
-                elastic=bool(part.locators.elastic.any()),
-            )  # fmt: skip
-        for number in np.flatnonzero(part.locators.elastic & ~part.locators.one_sided) if part.free else ():
-            yield _holding_pair(part, int(owners[number]), start, int(number))
-        for number in (
-            np.flatnonzero(part.locators.springy & ~part.locators.one_sided & ~part.locators.elastic) if part.free else ()
-        ):
-            yield _spring_pair(part, int(owners[number]), start, int(number))
-        start += len(part.locators)
+        locators, owners = part.locators, np.array(part.owners or (index,) * len(part.locators), dtype=int)
+        scene = next(scene for scene in scenes if scene.station == part.station)
+        for owner in np.unique(owners[locators.one_sided]) if part.free else ():
+            supports = np.flatnonzero(locators.one_sided & (owners == owner))
+            name, elastic = scene.supports_name(parts[owner].part), bool(locators.elastic.any())
+            yield _locator_pair(part, name, int(owner), start, supports, elastic=elastic)
+        for number in np.flatnonzero(locators.elastic & ~locators.one_sided) if part.free else ():
+            label, owner, point = locators.labels[number], int(owners[number]), np.array([number])
+            yield _locator_pair(part, label, owner, start, point, holds=True, elastic=True)
+        for number in np.flatnonzero(locators.springy & ~locators.one_sided & ~locators.elastic) if part.free else ():
+            yield _spring_pair(_locator_pair(part, locators.labels[number], int(owners[number]), start, np.array([number])))
+        start += len(locators)
 
 
-def _holding_pair(part: NominalPart, owner: int, start: int, number: int) -> ContactPoints:
-    """Return a two-sided locator of an elastic part as a pair of one point, which pushes and pulls."""
-    locators, point = part.locators, np.array([number])
-    P, stiffness = locators.points[point], np.where(locators.springy, locators.stiffness, np.inf)[point]
+def _locator_pair(
+    part: NominalPart, name: str, owner: int, start: int, numbers: np.ndarray, *, holds: bool = False, elastic: bool = False
+) -> ContactPoints:
+    """Return some locators of a part, by their numbers, as a pair."""
+    locators = part.locators
+    P, n, stiffness = (
+        values[numbers]
+        for values in (locators.points, locators.directions, np.where(locators.springy, locators.stiffness, np.inf))
+    )
+    offsets, of_all = _support_offsets(locators, start, numbers), start + numbers
     return ContactPoints(
-        locators.labels[number], owner, part.parent, P, P, locators.directions[point], _support_offsets(locators, start, point),
-        locators=start + point, stiffness=stiffness, holds=True, elastic=True,
-    )  # fmt: skip
+        name, owner, part.parent, P, P, n, offsets, locators=of_all, stiffness=stiffness, holds=holds, elastic=elastic
+    )
 
 
-def _spring_pair(part: NominalPart, owner: int, start: int, number: int) -> ContactPoints:
+def _spring_pair(locator: ContactPoints) -> ContactPoints:
     """Return a compliant two-sided locator as a pair: a spring that pushes and one that pulls, at the same point."""
-    locators, twice = part.locators, np.array([number, number])
-    P, signs = locators.points[twice], np.array([1.0, -1.0])
-    heights = _support_offsets(locators, start, twice[:1])
-    offsets = Offsets(heights.columns, heights.matrix * signs)
-    return ContactPoints(
-        locators.labels[number], owner, part.parent, P, P, signs[:, None] * locators.directions[twice], offsets,
-        locators=start + twice, stiffness=locators.stiffness[twice], pulls=signs < 0,
-    )  # fmt: skip
+    both, signs = locator.take(np.array([0, 0])), np.array([1.0, -1.0])
+    offsets = Offsets(both.offsets.columns, both.offsets.matrix * signs)
+    return replace(both, n_r=signs[:, None] * both.n_r, offsets=offsets, pulls=signs < 0)
 
 
 def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Offsets:

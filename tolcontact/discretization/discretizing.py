@@ -11,9 +11,10 @@ import numpy as np
 from tolcontact.declaration import Assembly, Face, Feature, Location, Locator, Part, ThreeTwoOne, Tolerance
 from tolcontact.declaration.locator import FIRST_ORDER, USUAL_STIFFNESS
 from tolcontact.discretization.contact_points import contact_points, support_pairs
+from tolcontact.discretization.fixed_contact import ContactPoints
 from tolcontact.discretization.locators import FACES_OF_SCHEME, Locators, NominalPart, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
-from tolcontact.discretization.nominal import ContactPoints, Nominal
+from tolcontact.discretization.nominal import Nominal
 from tolcontact.discretization.scales import scale_faults
 from tolcontact.discretization.scenes import Scene, joint_indices, scenes_of
 from tolcontact.discretization.weld_pairs import welds_and_pairs

@@ -8,13 +8,14 @@ other face's point at the pose.
 import numpy as np
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Float, Int
-from tolcontact.discretization.nominal import ContactPoints
+from tolcontact.arrays import Array, Float
+from tolcontact.discretization.fixed_contact import ContactPoints
+from tolcontact.discretization.offsets import PairForm
 from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry import region_kernel
-from tolcontact.geometry.meeting import NEARNESS, Meeting
+from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
-from tolcontact.geometry.places import Places, RaisedPlaces
+from tolcontact.geometry.places import PLAIN, Look, Places, RaisedPlaces
 
 FIRST_POINT = 1 << 40  # label of the first contact point
 EXACT_SHARE = 0.1  # of the largest dip of the gap between points: heights in smaller gaps are exact, others from splines
@@ -26,27 +27,27 @@ def raised_places(
     meeting: Meeting,
     X_RM: Float[Array, "n 12"],
     deviations: Float[Array, "n contributor"],
-    retained: Int[Array, "n k"] | None = None,
-    error: float = 0.0,
-    nearness: float = NEARNESS,
+    look: Look = PLAIN,
     depth: float = np.inf,
-    ceilings: Float[Array, " n"] | None = None,
 ) -> RaisedPlaces:
     """Return the candidate contacts of a pair at X_RM (n, 12), see Meeting.at, for deviations (n, contributor).
 
-    Minima of the gap between contact points are among them if they are deeper than `depth` [mm]. `ceilings` (n,) [mm] are of
-    gaps between faces that have grown; with form they do not count.
+    Minima of the gap between contact points are among them if they are deeper than `depth` [mm]. Ceilings are of gaps between
+    faces that have grown; with form they do not count.
     """
     grown = pair.heights(deviations)[:, None]
-    if not pair.has_form:
-        places = meeting.at(X_RM, retained, error, nearness, None if ceilings is None else ceilings + grown[:, 0])
+    form = pair.form(deviations)
+    if form is None:
+        ceilings = None if look.ceilings is None else look.ceilings + grown[:, 0]
+        places = meeting.at(X_RM, look._replace(ceilings=ceilings))
         return RaisedPlaces(places, np.broadcast_to(grown, places.gaps.shape))
+    retained = look.retained
     at_ends = None if retained is None else np.where(retained < FIRST_POINT, retained, -1)
-    ends = meeting.at(X_RM, at_ends, error, nearness)
+    ends = meeting.at(X_RM, look._replace(retained=at_ends, ceilings=None))
     row, place = np.nonzero(np.isfinite(ends.gaps))
     heights = np.zeros(ends.gaps.shape)
-    heights[row, place] = pair.form(deviations).at(row, ends.P_m[row, place], ends.P_r[row, place])
-    raised = RaisedPlaces(ends, heights).followed_by(*_points(pair, X_RM, deviations, retained, depth))
+    heights[row, place] = form.at(row, ends.P_m[row, place], ends.P_r[row, place])
+    raised = RaisedPlaces(ends, heights).followed_by(*_points(pair, form, X_RM, deviations, retained, depth))
     return raised._replace(heights=grown + raised.heights)
 
 
@@ -64,7 +65,7 @@ def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> tuple[Float[A
 
 
 def _points(
-    pair: ContactPoints, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None, depth: float
+    pair: ContactPoints, form: PairForm, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None, depth: float
 ) -> tuple[RaisedPlaces, RaisedPlaces]:
     """Return points inside the rims of the faces as candidates, and minima of the gap between them, with the forms there.
 
@@ -118,7 +119,7 @@ def _points(
     row, place = _exact(gaps - heights, minima.bulge(deviations))
     moved = pose.apply(poses[row], P_m[row, place, None])[:, 0]
     true_feet = moved - ((moved - P_r[row, place]) @ pair.n_r[0])[:, None] * pair.n_r[0]
-    heights[row, place] = pair.form(deviations).at(row, P_m[row, place], true_feet)
+    heights[row, place] = form.at(row, P_m[row, place], true_feet)
     return RaisedPlaces(Places(labels, gaps, P_m, P_r, n_r), heights), minima.at(poses, deviations, between)
 
 

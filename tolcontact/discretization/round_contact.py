@@ -1,13 +1,22 @@
-"""Contact of round faces: a ball or shaft of one part against walls of the other. Nominal assembly frame, mm."""
+"""Contact of round faces: a ball or shaft of one part against walls of the other. Nominal assembly frame, mm.
+
+Its gaps are in mechanics/round_gap.
+"""
 
 import itertools
 import math
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import trimesh
 
-from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, RoundPoint, arc, tangent_directions
+from tolcontact import poses as pose
+from tolcontact.arrays import Array, Bool, Float
+from tolcontact.discretization.following_contact import FollowingContact
+from tolcontact.discretization.offsets import Offsets
+from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, RoundPoint, RoundPoints, arc, tangent_directions
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, RoundSurface, Sphere
 from tolcontact.geometry.surface import Piece, Surface
 from tolcontact.geometry.tolerances import PARALLEL, SAME_PLACE
@@ -17,8 +26,72 @@ MAX_POINTS = 40  # of a pair
 ARC_MARGIN = math.radians(5.0)  # between the line of contact and the ends of a shaft's arc
 AXIS_PLACES = 200  # places along an axis that are examined
 BISECTIONS = 40
+OVERHANG_SHARE = 0.01  # of their radius: overhang beyond a wall at which balls and shafts that travelled far may be active
 MAX_FACET_SINE = 0.3  # of half the angle between facets
 NORMAL_TOLERANCE = 1e-7  # between the normals of neighbouring triangles of one plane
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RoundContact(FollowingContact):
+    """Contact of balls and shafts with walls.
+
+    round   the balls and shafts, and their walls; P^m, P^r, n^r are their nominal contact points
+    """
+
+    _accuracy_in_words: ClassVar[str] = ", exact on round faces"
+
+    round: RoundPoints
+
+    @classmethod
+    def between(
+        cls, moving: Surface, reference: Surface, reach: float, rounding: float, common: Mapping[str, Any]
+    ) -> Self | None:
+        points = round_points(moving, reference, reach)
+        if not points:
+            return None
+        if any(point.is_hollow for point in points):
+            rounding = 0.0  # a hollow wall is fitted to many vertices: rounding hardly moves it
+        P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in points), strict=True))
+        P_r, offsets = P_r - rounding * n_r if rounding else P_r, Offsets.joined([], len(P_m))
+        found = RoundPoints.of(points)
+        return cls(P_m=P_m, P_r=P_r, n_r=n_r, offsets=offsets, coordinate_error=rounding, round=found, **common)
+
+    @property
+    def counts_centres(self) -> bool:
+        return self.round.are_beside
+
+    def counted(self, *, of_moving: bool) -> tuple[Float[Array, "point 3"], Float[Array, " point"]]:
+        """Return the centres of round faces: a point on one would leave its part free to roll.
+
+        It could then move aside at no cost until it is clear. In a hollow wall the tangent planes have contact points on all
+        sides, which is as good. An end of a shaft's axis has no radius, since the other end holds the shaft.
+        """
+        if not self.counts_centres:
+            return super().counted(of_moving=of_moving)
+        centres, radii = zip(*(point.curvature(of_moving=of_moving) for point in self.round), strict=True)
+        is_end = self.round.points["axis"].any(axis=1) & (self.round.points["on_moving"] == of_moving)
+        return np.array(centres), np.where(is_end, 0.0, radii)
+
+    @property
+    def shapes(self) -> tuple[Mapping[str, np.ndarray], Mapping[str, np.ndarray]]:
+        return self.round.walls, self.round.points
+
+    @property
+    def stays(self) -> Bool[Array, " point"]:
+        return ~self.round.points["is_hollow"]
+
+    def stiffness_shares(self) -> np.ndarray:
+        return np.where(self.round.points["axis"].any(axis=1), 0.5, 1.0)  # a shaft has two ends
+
+    def touching(self, X_RM: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        centres, radii, on_moving = (self.round.points[name][points] for name in ("centre", "radius", "on_moving"))
+        at_body = np.where(on_moving[:, None], pose.apply(X_RM, centres), centres)
+        return np.asarray(at_body - np.where(on_moving, radii, -radii)[:, None] * normals)
+
+    def ends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        points = self.round.points
+        is_inside = np.logical_not(points["cut"].any(axis=1))  # a shaft may continue beyond a wall
+        return points["centre"], points["on_moving"], is_inside, OVERHANG_SHARE * float(points["radius"].max())
 
 
 def round_points(moving: Surface, reference: Surface, reach: float) -> list[RoundPoint]:

@@ -5,6 +5,7 @@ points are computed at every pose from a few numbers, so they are exact; none is
 """
 
 import math
+import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
@@ -200,6 +201,11 @@ class RoundPoints:
         names = [entry.name for entry in fields(RoundPoint) if entry.name != "wall"]
         arrays = {name: np.array([getattr(point, name) for point in points]) for name in names}
         return cls(surface_arrays([point.wall for point in points]), arrays)
+
+    @property
+    def fingerprint(self) -> tuple[bytes, ...]:
+        """All numbers of the points: points with the same fingerprint have the same equations."""
+        return tuple(pickle.dumps(point) for point in self)
 
     @property
     def are_beside(self) -> bool:

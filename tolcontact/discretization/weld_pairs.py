@@ -7,16 +7,13 @@ needs no contact point: rows of the same nodes would contradict each other by th
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 import trimesh
-from scipy.spatial import KDTree
 
 from tolcontact.declaration import Assembly, Joint
-from tolcontact.discretization.contact_points import height_offsets
+from tolcontact.discretization.fixed_contact import ContactPoints
 from tolcontact.discretization.locators import NominalPart
-from tolcontact.discretization.nominal import ContactPoints
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.scenes import Scene
 from tolcontact.discretization.weld import Weld
@@ -66,14 +63,7 @@ def _without_held_points(pair: ContactPoints, holding: Sequence[ContactPoints]) 
         for other in holding
         if {other.moving, other.reference} == {pair.moving, pair.reference}
     ]
-    if not held or pair.is_supports or pair.round is not None:
-        return pair
-    free = np.flatnonzero(KDTree(np.concatenate(held)).query(pair.P_m)[0] > MAX_OFFSET)
-    if not free.size:
-        raise GeometryFault("guns or welds hold its parts at all its contact points; leave the pair out, or give more points")
-    stiffness = None if pair.stiffness is None else pair.stiffness[free]
-    points = {name: getattr(pair, name)[free] for name in ("P_m", "P_r", "n_r")}
-    return replace(pair, **points, offsets=pair.offsets.take(free), stiffness=stiffness)
+    return pair.without(np.concatenate(held), MAX_OFFSET) if held else pair
 
 
 def _weld(
@@ -124,11 +114,10 @@ def _guns(
     """Yield the guns of a weld at points P (gun, 3) with normals n (gun, 3): a pair for each two faces that they hold."""
     for number, faces in enumerate(dict.fromkeys(deviating), 1):
         held = [k for k, other in enumerate(deviating) if other == faces]
-        guns = ContactPoints(
+        yield ContactPoints(
             f"guns of {name}" + (f" {number}" if number > 1 else ""), weld.moving, weld.reference, P[held], P[held], n[held],
             Offsets.joined([], len(held)), deviating=faces, holds=True, elastic=True,
-        )  # fmt: skip
-        yield replace(guns, offsets=height_offsets(guns))
+        ).with_heights()  # fmt: skip
 
 
 def _pad_rows(centre: np.ndarray, n: np.ndarray, pad: float | None) -> list[tuple[np.ndarray, np.ndarray]]:

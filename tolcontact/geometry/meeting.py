@@ -24,7 +24,7 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel, places_kernel
 from tolcontact.geometry.facing_planes import facing_planes, moot_corners
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER, TINY
-from tolcontact.geometry.places import Places
+from tolcontact.geometry.places import PLAIN, Look, Places
 from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
 from tolcontact.geometry.sorted_candidates import sorted_candidates
 from tolcontact.geometry.surface import Surface
@@ -33,7 +33,6 @@ from tolcontact.geometry.triangle_mesh import blocks, overlaps
 TILT_MARGIN = 0.1  # rad: tilt of candidates in addition to the largest tilt of the body
 MAX_COMPARISONS = 100_000_000  # of corners with facets, and of edges with edges
 MAX_CANDIDATES = 100_000
-NEARNESS = 2.0  # margins outside edges: largest distance of such a contact point from a point where the planes touch
 EXTENSION_FACTOR = 4.0  # factor of travel and rotation for bodies beyond reach
 MAX_TRAVEL = 1e4  # in sizes
 MAX_POINTS = 32  # contact points returned per pose
@@ -174,44 +173,22 @@ class Meeting:
         numbers = np.unique((self.moving.vertices @ np.vstack([DIRECTIONS, CORNERS]).T).argmax(axis=0))
         return np.ascontiguousarray(self.moving.vertices[numbers])
 
-    def at(
-        self,
-        X_RM: Float[Array, "n 12"],
-        retained: Int[Array, "n k"] | None = None,
-        error: float = 0.0,
-        nearness: float = NEARNESS,
-        ceilings: Float[Array, " n"] | None = None,
-    ) -> Places:
-        """Return the relevant contact points at poses X_RM (n, 12), including the candidates in `retained` (n, k), -1 for none.
+    def at(self, X_RM: Float[Array, "n 12"], look: Look = PLAIN) -> Places:
+        """Return the relevant contact points at poses X_RM (n, 12).
 
         Where bodies are beyond reach, the points belong to the `extended` meeting. Its indices follow the indices of this one.
-
-        Facing planes count beyond their edges up to an error of `error` [mm], within the distance of a touching point that
-        `nearness` states. Steps need this: otherwise a corner that overhangs an edge becomes active and inactive in turn.
-
-        Points of facing planes with gaps above `ceilings` (n,) [mm] may be missing if there are points with smaller gaps.
         """
         beyond = np.flatnonzero(~self.covers(X_RM))
-        ceilings = np.full(len(X_RM), np.inf) if ceilings is None else ceilings
         if beyond.size and self.extended is not None:
-            return self._beyond(beyond, X_RM, retained, error, nearness, ceilings)
-        return self._near(X_RM, retained, error, nearness, ceilings)
+            return self._beyond(beyond, X_RM, look)
+        return self._near(X_RM, look)
 
-    def _beyond(
-        self,
-        rows: np.ndarray,
-        X_RM: np.ndarray,
-        retained: np.ndarray | None,
-        error: float,
-        nearness: float,
-        ceilings: np.ndarray,
-    ) -> Places:
+    def _beyond(self, rows: np.ndarray, X_RM: np.ndarray, look: Look) -> Places:
         """Return contact points at poses; at some of them, `rows`, the bodies are beyond reach."""
         assert self.extended is not None
         count = len(self)
-        nearby = self._near(X_RM, retained, error, nearness, ceilings)
-        extended_retained = None if retained is None else np.maximum(retained[rows] - count, -1)
-        extended_places = self.extended.at(X_RM[rows], extended_retained, error, nearness, ceilings[rows])
+        nearby = self._near(X_RM, look)
+        extended_places = self.extended.at(X_RM[rows], look.take(rows, count))
         extended_places = extended_places._replace(
             labels=np.where(extended_places.labels >= 0, extended_places.labels + count, -1)
         )
@@ -224,24 +201,22 @@ class Meeting:
             padded.append(values)
         return Places(*padded)
 
-    def _near(
-        self, X_RM: np.ndarray, retained: np.ndarray | None, error: float, nearness: float, ceilings: np.ndarray
-    ) -> Places:
+    def _near(self, X_RM: np.ndarray, look: Look) -> Places:
         """Return contact points at poses within reach."""
         width = max(min(len(self), MAX_POINTS), 1)
         shape = (len(X_RM), width)
         places = Places(np.empty(shape, dtype=np.int64), np.empty(shape), *(np.zeros((*shape, 3)) for _ in range(3)))
         # Bodies that were beyond reach before may have kept candidates of the extended meeting.
-        retained = (
-            np.zeros((len(X_RM), 0), dtype=np.int64) if retained is None else np.where(retained < len(self), retained, -1)
-        )
+        retained = np.zeros((len(X_RM), 0), dtype=np.int64) if look.retained is None else look.retained
+        retained = np.where(retained < len(self), retained, -1)
+        ceilings = np.full(len(X_RM), np.inf) if look.ceilings is None else look.ceilings
         count = places_kernel.find(
             self.moving, self.reference, self.candidates,
             np.array(
                 [self.reach.depth, self.reach.height, np.inf if self.is_free else _passed(self.reach, self.size), self.slant]
             ),
             kernel.MARGIN * self.size + self.overhang,
-            np.array([error, self.reach.depth, nearness, self.overhang]),
+            np.array([look.error, self.reach.depth, look.nearness, self.overhang]),
             np.ascontiguousarray(X_RM), retained, ceilings, DIRECTIONS, *places,
         )  # fmt: skip
         return Places(*(np.ascontiguousarray(values[:, : max(count, 1)]) for values in places))

@@ -22,6 +22,30 @@ class Places(NamedTuple):
     n_r: Float[Array, "n p 3"]
 
 
+class Look(NamedTuple):
+    """How places are looked for at n poses.
+
+    retained   (n, k): indices of candidates that are included, -1 for none
+    error      [mm]: facing planes count up to this error beyond their edges. Steps need this: otherwise a corner that overhangs
+               an edge becomes active and inactive in turn
+    nearness   in margins outside edges: largest distance of such a place from a point where the planes touch
+    ceilings   (n,) [mm]: places of facing planes with larger gaps may be missing if there are places with smaller gaps
+    """
+
+    retained: Int[Array, "n k"] | None = None
+    error: float = 0.0
+    nearness: float = 2.0
+    ceilings: Float[Array, " n"] | None = None
+
+    def take(self, rows: Int[Array, " m"], first: int) -> "Look":
+        """Return how the places of some rows are looked for, where indices start from a `first` candidate."""
+        retained = None if self.retained is None else np.maximum(self.retained[rows] - first, -1)
+        return self._replace(retained=retained, ceilings=None if self.ceilings is None else self.ceilings[rows])
+
+
+PLAIN = Look()
+
+
 class RaisedPlaces(NamedTuple):
     """Points of nominal faces, and the heights (n, place) [mm] of both faces there, which reduce the gaps."""
 

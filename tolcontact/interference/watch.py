@@ -126,7 +126,7 @@ class Watch:
         """Return the numbers (t,) of the pairs of round faces that the triangles of both bodies represent, -1 for none."""
         numbers = [np.full(len(body.solid.faces), -1) for body in map(self.solid, pair) if body is not None]
         for k, points in enumerate(self.nominal.pairs):
-            if points.round is None or points.reference is None or ordered(points.moving, points.reference) != pair:
+            if points.samples_faces or points.reference is None or ordered(points.moving, points.reference) != pair:
                 continue
             for part, face in ((points.moving, points.moving_face), (points.reference, points.reference_face)):
                 body = self.solid(part)
@@ -175,14 +175,14 @@ class Watch:
     @property
     def untested_pairs(self) -> tuple[str, ...]:
         """The names of contact pairs whose bodies may interfere, since they are compliant or have form deviations."""
-        pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and (pair.is_springy or pair.has_form)]
+        pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and pair.may_interfere]
         return tuple(dict.fromkeys(pair.name for pair in pairs))
 
     @property
     def round_pairs(self) -> tuple[str, ...]:
         """The names of contact pairs of round faces: their gaps are exact, and their triangles are not compared."""
-        pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and pair.round is not None]
-        return tuple(dict.fromkeys(pair.name for pair in pairs if not (pair.is_springy or pair.has_form)))
+        pairs = [pair for pair in self.nominal.pairs if pair.reference is not None and not pair.samples_faces]
+        return tuple(dict.fromkeys(pair.name for pair in pairs if not pair.may_interfere))
 
     @cached_property
     def overlapping(self) -> frozenset[tuple[int, int]]:

@@ -7,7 +7,9 @@ An affine function has its minimum at a corner of the points' convex hull, so th
 at any pose.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -15,6 +17,42 @@ from scipy.spatial import ConvexHull, QhullError
 
 from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
+
+Point = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # P^m, P^r, n^r, and 1 if it has a row
+
+
+class RowPoints(NamedTuple):
+    """The points of a pair that have rows.
+
+    points       none if they follow from every pose
+    compliance   (row, 1) [mm/N]: of compliant points; 0 for rigid ones
+    bend         (12, 1): of the points in the slots of the previous step; None for points that always have a row, since their
+                 previous reactions are available
+    """
+
+    points: Sequence[Point]
+    compliance: ca.SX
+    bend: ca.SX | None = None
+
+
+class GapTerms(NamedTuple):
+    """The gaps of a pair's points at X_RM, and their derivatives by the increments z.
+
+    gaps              (point, 1) [mm]; where two tangents of a hollow wall nearly agree, both have the gap of the nearer one
+    slopes            (point, z): derivatives of the gaps by z
+    bends             (12, 1): sum of reaction times gap derivative by X_RM
+    curvature         (z, z): sum of reaction times second gap derivative, for X_RM linear in z, without `hollow_curvature`
+    hollow_curvature  (z, z): the part of that sum due to bodies sliding along hollow walls; positive semidefinite, and to be
+                      subtracted from `curvature`
+    distances         (point, 1) [mm]: the gap of each point, without regard to other tangents
+    """
+
+    gaps: ca.SX
+    slopes: ca.SX
+    bends: ca.SX
+    curvature: ca.SX
+    hollow_curvature: ca.SX
+    distances: ca.SX
 
 
 def gap(X_RM: Pose, P_m: ca.SX, P_r: ca.SX, n_r: ca.SX) -> ca.SX:
@@ -87,3 +125,47 @@ def _corners(coordinates: np.ndarray) -> np.ndarray:
         except QhullError:  # the points lie almost on one line
             pass
     return np.arange(coordinates.shape[1])
+
+
+class FixedGaps:
+    """Gaps of fixed points over fixed tangent planes, paper (5): affine in X_RM.
+
+    key   what distinguishes the equations of one pair from another's, except for their inputs
+    """
+
+    def __init__(self, pair: ContactPoints) -> None:
+        self._pair = pair
+        self.key: tuple[bytes, ...] = ()
+
+    def compiled(self, inputs: int) -> GapMap | ca.Function:
+        """Return all gaps at X_RM, for a number of `inputs` of a realization."""
+        return gap_map(gap_matrix(self._pair), self._pair.offsets)
+
+    def points(self, chosen: np.ndarray, deviations: ca.SX) -> list[Point]:
+        """Return points that always have a row: constants, except for the offsets that depend on deviations."""
+        pair = self._pair
+        P_m, P_r, n_r = (ca.SX(ca.DM(values[chosen].T)) for values in (pair.P_m, pair.P_r, pair.n_r))
+        offsets = pair.offsets.take(chosen)
+        if offsets.columns.size:
+            heights = ca.sparsify(ca.DM(offsets.matrix.T)) @ deviations[offsets.columns.tolist()]
+            P_r = P_r + n_r @ ca.diag(heights)
+        return list(zip(*(ca.horzsplit(values) for values in (P_m, P_r, n_r, ca.SX.ones(1, len(chosen)))), strict=True))
+
+    def values(self, X_RM: Pose, heights: ca.SX, points: RowPoints) -> Sequence[ca.SX]:
+        """Return the gaps of the rows at a pose, for the growth (2, 1) [mm] of both faces."""
+        return [gap(X_RM, P_m, P_r, n_r) for P_m, P_r, n_r, _ in points.points]
+
+    def rows(self, X_RM: Pose, by_z: ca.SX, heights: ca.SX, points: RowPoints, reactions: ca.SX) -> GapTerms:
+        """Return the gaps of the rows about X_RM, whose derivatives by the increments are `by_z` (12, z), see contact_rows."""
+        slopes, gaps = [], []
+        bends = ca.SX.zeros(ENTRIES) if points.bend is None else points.bend
+        for row, (P_m, P_r, n_r, _) in enumerate(points.points):
+            X = ca.SX.sym("X_RM", ENTRIES)
+            g = gap(pose_of(X), P_m, P_r, n_r)
+            gradient = ca.substitute(ca.jacobian(g, X), X, X_RM.vector())
+            if points.bend is None:
+                bends += gradient.T * reactions[row]
+            slopes.append(gradient @ by_z)
+            gaps.append(ca.substitute(g, X, X_RM.vector()))
+        flat, all_gaps = ca.SX(by_z.size2(), by_z.size2()), ca.vertcat(ca.SX(0, 1), *gaps)
+        return GapTerms(all_gaps, ca.vertcat(ca.SX(0, by_z.size2()), *slopes), bends, flat, flat, all_gaps)

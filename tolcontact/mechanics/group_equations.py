@@ -3,7 +3,7 @@
 A small rigid deviation enters as the pose of the face. It adds no rows: contact points, their hull and the QP are unchanged.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -48,15 +48,17 @@ def face_heights(pair: ContactPoints, deviations: ca.SX) -> ca.SX:
     return ca.vertcat(moving, reference - pair.coordinate_error)
 
 
-def facing_pose(faces: tuple[Pose | None, Pose | None], X_WM: Pose, X_WR: Pose | None) -> Pose:
-    """Return X_RM of a pair: the pose of its moving face in the frame of its reference face.
+def facing_pose(pair: ContactPoints, faces: tuple[Pose | None, Pose | None], pose_of_part: Callable[[int], Pose]) -> Pose:
+    """Return X_RM of a pair: the pose of its moving face in the frame of its reference face, which may be the ground.
 
-    `faces` are the poses of the moving and the reference face in their parts. X_WR is None for the ground.
+    `faces` are the poses of the moving and the reference face in their parts.
     """
     moving, reference = faces
+    X_WM = pose_of_part(pair.moving)
     X_WF = X_WM if moving is None else X_WM @ moving
-    if X_WR is None:
+    if pair.reference is None:
         return X_WF
+    X_WR = pose_of_part(pair.reference)
     return relative(X_WF, X_WR if reference is None else X_WR @ reference)
 
 
@@ -111,11 +113,11 @@ class GroupEquations:
         centres = [poses[k].apply(constant(mobilities[k].centre)) for k in map(self.group.position, self.group.free)]
         return Motion(mobilities, poses, increments(self.z, self.group.length, centres))
 
+    def pair(self, k: int) -> ContactPoints:
+        """Return a pair, given by its position in the group."""
+        return self.nominal.pairs[self.group.pairs[k]]
+
     def relative(self, poses: Sequence[Pose]) -> list[Pose]:
         """Return X_RM of the faces of each pair of the group."""
-        relative_poses = []
-        for index, faces in zip(self.group.pairs, self.faces, strict=True):
-            pair = self.nominal.pairs[index]
-            reference = None if pair.reference is None else poses[self.group.position(pair.reference)]
-            relative_poses.append(facing_pose(faces, poses[self.group.position(pair.moving)], reference))
-        return relative_poses
+        in_group = dict(zip(self.group.parts, poses, strict=True))
+        return [facing_pose(self.pair(k), faces, in_group.__getitem__) for k, faces in enumerate(self.faces)]

@@ -131,11 +131,7 @@ class Group:
 def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
     """Return the positions of a group's pairs whose curved reference face is represented by fixed planes."""
     pairs = [nominal.pairs[index] for index in group.pairs]
-    return [
-        k
-        for k, pair in enumerate(pairs)
-        if pair.reference_face is not None and pair.round is None and pair.reference_face.curvature > 0
-    ]
+    return [k for k, pair in enumerate(pairs) if pair.curvature > 0]
 
 
 def contact_groups(nominal: Nominal, method: Method) -> list[Group]:
@@ -273,7 +269,7 @@ def _side(
     if method.counts_faces and _area(pair) > 0:
         weights = weights * (_area(pair) * density / len(points))
         region = pair.regions[0 if of_moving else 1]
-        if region is not None and pair.round is None:
+        if region is not None and pair.samples_faces:
             face_moments = moment_table(region.places, centre) @ region.shares * density
     all_moments = (moment_table(points, centre) * weights).sum(axis=1) if face_moments is None else face_moments.copy()
     all_moments[[4, 7, 9]] += all_moments[0] * radius**2

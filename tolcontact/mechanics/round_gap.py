@@ -2,12 +2,13 @@
 
 import functools
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from tolcontact.discretization import RoundPoint, RoundPoints
+from tolcontact.discretization import RoundContact, RoundPoint, RoundPoints
+from tolcontact.mechanics.gap import FixedGaps, GapMap, GapTerms, Point, RowPoints
+from tolcontact.mechanics.group_equations import face_heights
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 from tolcontact.mechanics.round_terms import Terms, round_terms
 from tolcontact.mechanics.symmetric_products import congruent
@@ -17,27 +18,7 @@ ROUNDING = 1e-14  # of the distance from the origin: error of a point that is co
 TANGENT_TOLERANCE = 0.05  # rad: tangents within this angle count as one
 
 
-class RoundGaps(NamedTuple):
-    """The gaps of round points at X_RM, and their derivatives by the increments z.
-
-    gaps              (point, 1) [mm]; where two tangents nearly agree, both have the gap of the nearer one
-    slopes            (point, z): derivatives of the gaps by z
-    bends             (12, 1): sum of reaction times gap derivative by X_RM
-    curvature         (z, z): sum of reaction times second gap derivative, for X_RM linear in z, without `hollow_curvature`
-    hollow_curvature  (z, z): the part of that sum due to bodies sliding along hollow walls; positive semidefinite, and to be
-                      subtracted from `curvature`
-    distances         (point, 1) [mm]: the gap of each point, without regard to other tangents
-    """
-
-    gaps: ca.SX
-    slopes: ca.SX
-    bends: ca.SX
-    curvature: ca.SX
-    hollow_curvature: ca.SX
-    distances: ca.SX
-
-
-def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.SX, by_z: ca.SX) -> RoundGaps:
+def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.SX, by_z: ca.SX) -> GapTerms:
     """Return the gaps of round points.
 
     X_RM       (12, 1)
@@ -74,7 +55,7 @@ def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.S
         for (body, terms), load in zip(terms_of_points, loads, strict=True):
             body.add(terms, load)
     freedoms = by_z.size2()
-    return RoundGaps(
+    return GapTerms(
         gaps=ca.vertcat(*gaps),
         slopes=ca.vertcat(*slopes),
         bends=sum((body.bends() for body in bodies), ca.SX(ENTRIES, 1)),
@@ -82,6 +63,37 @@ def round_gaps(points: RoundPoints, X_RM: ca.SX, growths: ca.SX, reactions: ca.S
         hollow_curvature=sum((body.hollow_curvature for body in bodies), ca.SX(freedoms, freedoms)),
         distances=ca.vertcat(*distances),
     )
+
+
+class RoundGaps(FixedGaps):
+    """Gaps of balls and shafts against walls, at points that follow from every pose (see round_gap)."""
+
+    def __init__(self, pair: RoundContact) -> None:
+        self._pair, self._round = pair, pair.round
+        self.key = pair.round.fingerprint
+
+    def compiled(self, inputs: int) -> GapMap | ca.Function:
+        """Return the Function X_RM, deviations -> gaps and distances (point, 1) [mm], see GapTerms."""
+        X_RM, deviations = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("deviations", inputs)
+        terms = self._at(X_RM, face_heights(self._pair, deviations))
+        outputs = {"gaps": terms.gaps, "distances": terms.distances}
+        return ca.Function("round_gaps", [X_RM, deviations], [*outputs.values()], ["X_RM", "deviations"], [*outputs])
+
+    def points(self, chosen: np.ndarray, deviations: ca.SX) -> list[Point]:
+        return []
+
+    def values(self, X_RM: Pose, heights: ca.SX, points: RowPoints) -> Sequence[ca.SX]:
+        return ca.vertsplit(self._at(X_RM.vector(), heights).gaps)
+
+    def rows(self, X_RM: Pose, by_z: ca.SX, heights: ca.SX, points: RowPoints, reactions: ca.SX) -> GapTerms:
+        z, count = sorted(set(by_z.sparsity().get_triplet()[1])), by_z.size2()  # increments of the two parts of the pair
+        terms = round_gaps(self._round, X_RM.vector(), heights, reactions, by_z[:, z])
+        slopes, curvature, hollow_curvature = (ca.SX(rows, count) for rows in (len(self._round), count, count))
+        slopes[:, z], curvature[z, z], hollow_curvature[z, z] = terms.slopes, terms.curvature, terms.hollow_curvature
+        return terms._replace(slopes=slopes, curvature=curvature, hollow_curvature=hollow_curvature)
+
+    def _at(self, X_RM: ca.SX, heights: ca.SX) -> GapTerms:
+        return round_gaps(self._round, X_RM, heights, ca.SX(len(self._round), 1), ca.SX(ENTRIES, 0))
 
 
 class _Body:

@@ -110,7 +110,7 @@ def unconstrained_rotations(draws: TrialDraws) -> Iterator[str]:
     for group in (compiled.group for compiled in draws.program.groups) if method.minimizes.counts_points else ():
         for mover, index in enumerate(group.free):
             moved = [side for side in group.sides if mover in group.mobilities[side.part].movers[-1:]]
-            if all(pairs[group.pairs[side.pair]].round for side in moved):
+            if not any(pairs[group.pairs[side.pair]].samples_faces for side in moved):
                 continue
             origin = np.asarray(moved[0].centre)
             moments = np.sum([moments_about(origin, side.moments, np.asarray(side.centre)) for side in moved], axis=0)

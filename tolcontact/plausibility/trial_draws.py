@@ -9,6 +9,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, push
+from tolcontact.contact import pair_search
 from tolcontact.interference import Clash
 from tolcontact.simulation import Block, simulate_block
 
@@ -37,11 +38,10 @@ class TrialDraws:
         """Return the draws of a program, without those that have no finite pose."""
         deviations = program.draws(seed=TRIAL_SEED, start=0, stop=DRAWS)
         placed = program.place(deviations=deviations)["poses"]
-        observed = program.observe(poses=placed, deviations=deviations)
-        relative = observed["relative"].reshape(len(deviations), len(program.nominal.pairs), pose.ENTRIES)
+        measured, relative = program.observed(placed, deviations)
         finite = np.isfinite(relative).all(axis=(1, 2))
         poses = placed.reshape(len(deviations), len(program.nominal.parts), pose.ENTRIES)
-        return cls(program, deviations[finite], relative[finite], observed["measured"][finite], poses[finite])
+        return cls(program, deviations[finite], relative[finite], measured[finite], poses[finite])
 
     def some(self, rows: Int[Array, " k"]) -> "TrialDraws":
         """Return some of these draws, rows (k,)."""
@@ -57,9 +57,9 @@ class TrialDraws:
 
     def _gaps(self, k: int, X_RM: np.ndarray, deviations: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
         pair = self.program.nominal.pairs[k]
+        if not pair.samples_faces:
+            return pair_search(self.program, k).gaps(X_RM, deviations, points)
         chosen_points = np.arange(len(pair.P_m)) if points is None else points
-        if pair.round is not None:
-            return np.asarray(self.program.round_gaps[k](X_RM=X_RM, deviations=deviations)["gaps"])[:, chosen_points]
         gaps = pair.nominal_gaps(X_RM, chosen_points) - pair.heights(deviations)[:, None]
         return gaps - pair.form_heights(deviations, chosen_points)
 

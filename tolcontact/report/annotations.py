@@ -74,8 +74,7 @@ def marks_of_nominal(nominal: Nominal) -> Marks:
 
 def fixed_points(pair: ContactPoints) -> tuple[np.ndarray, np.ndarray]:
     """Return contact points (point, 3) and gaps (point,) [mm], except on nearest tangents of hollow walls, which move."""
-    is_fixed = ~pair.round.points["is_hollow"] if pair.round else np.ones(len(pair.P_m), dtype=bool)
-    return pair.P_m[is_fixed], pair.nominal_gaps(pose.AT_REST[None])[0, is_fixed]
+    return pair.P_m[pair.stays], pair.nominal_gaps(pose.AT_REST[None])[0, pair.stays]
 
 
 def _locators(results: xr.DataTree) -> list[Mark]:

@@ -136,7 +136,7 @@ def simulate_block(
         resolvers = [ContactResolver(program, group).twin() for group in program.groups]
     placed = program.place(deviations=deviations)["poses"]
     raw = placed.reshape(len(deviations), len(program.nominal.parts), ENTRIES)
-    measured, relative = _observe(program, raw, deviations)
+    measured, relative = program.observed(raw, deviations)
     nominal, stations = program.nominal, len(program.stations)
     counts = {"pairs": len(nominal.pairs), "loads": len(nominal.loads), "welds": nominal.input_count - deviations.shape[1]}
     block = Block.untouched(start, deviations, raw, measured, stations=stations, **counts)
@@ -169,7 +169,7 @@ def simulate_block(
     outcomes_by_stage[is_unknown], block.kkt_residual[is_unknown] = Outcome.UNSOLVED, np.inf
     worst = outcomes_by_stage.max(axis=1)
     touched = worst > Outcome.UNTOUCHED
-    block.measured[touched, CORRECTED], _ = _observe(program, block.poses[touched, CORRECTED], deviations[touched])
+    block.measured[touched, CORRECTED], _ = program.observed(block.poses[touched, CORRECTED], deviations[touched])
     if program.observe_bent is not None:
         poses = block.poses[touched, CORRECTED].reshape(int(touched.sum()), -1)
         bent = program.observe_bent(poses=poses, deviations=deviations[touched], loads=block.load[touched])
@@ -254,11 +254,3 @@ def _statuses(is_exact: bool) -> np.ndarray:
     """Return the Status for each Outcome. Only repeated steps can show that no pose is free of penetration."""
     conflict = Status.NOT_ASSEMBLABLE if is_exact else Status.NOT_CONVERGED
     return np.array([Status.UNTOUCHED, Status.RESOLVED, conflict, Status.DOUBTFUL, Status.NOT_CONVERGED], dtype=np.int8)
-
-
-def _observe(
-    program: Program, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]
-) -> tuple[Float[Array, "n measure"], Float[Array, "n pair 12"]]:
-    """Return measures (realization, measure) and X_RM (realization, pair, 12) at poses (realization, part, 12)."""
-    results = program.observe(poses=poses, deviations=deviations)
-    return results["measured"], results["relative"].reshape(len(poses), len(program.nominal.pairs), ENTRIES)

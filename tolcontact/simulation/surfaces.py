@@ -42,17 +42,16 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
     nominal = program.nominal
     ended = max(ENDED_SHARE * min(nominal.assembly.smallest_zone(), DEFAULT_RANGE), ON_PLANE_GAP)
     surfaces = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
-    relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), 12)
-    raw = program.place(deviations=deviations)["poses"]
-    raw_relative = program.observe(poses=raw, deviations=deviations)["relative"].reshape(relative.shape)
+    _, relative = program.observed(poses, deviations)
+    _, raw_relative = program.observed(program.place(deviations=deviations)["poses"], deviations)
     for k, pair in enumerate(nominal.pairs):
         faces = nominal.face_pair(k)
         if faces is None or pair.reference is None or pair.is_springy:  # compliant faces may penetrate
             continue
         X_RM, heights = relative[:, k], pair.heights(deviations)
-        form = pair.form(deviations) if pair.has_form else None
+        form = pair.form(deviations)
         surfaces.penetration[:, k] = faces.depth(X_RM, heights, form)
-        if not pair.round and k not in program.meetings:  # otherwise contact points project onto the face
+        if pair.samples_faces and k not in program.meetings:  # otherwise contact points project onto the face
             points = pose.apply(X_RM, pair.P_m)
             gaps = pair.nominal_gaps(X_RM)
             raised = heights[:, None] if form is None else heights[:, None] + pair.form_heights(deviations)

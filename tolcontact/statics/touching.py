@@ -125,11 +125,8 @@ def _nominal_points(pair: ContactPoints) -> TouchingPoints:
     """Return where a pair touches nominally."""
     assert pair.moving_face is not None and pair.reference_face is not None
     size = max(pair.moving_face.mesh.scale, pair.reference_face.mesh.scale)
-    touches = (
-        np.linalg.norm(pair.P_m - pair.P_r, axis=1) <= TOUCH_SHARE * size + pair.facets + pair.bulge + pair.coordinate_error
-    )
-    if pair.round is not None:
-        touches &= ~pair.round.points["is_hollow"]  # their contact points change with the pose
+    nearness = TOUCH_SHARE * size + pair.facets + pair.bulge + pair.coordinate_error
+    touches = pair.stays & (np.linalg.norm(pair.P_m - pair.P_r, axis=1) <= nearness)
     return TouchingPoints(pair.P_r[touches], pair.n_r[touches])
 
 

@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive import ArchiveWriter, Run, row_values
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
-from tolcontact.contact import kernel
-from tolcontact.discretization import Nominal, raised_places
+from tolcontact.contact import pair_search
+from tolcontact.discretization import Nominal
 from tolcontact.simulation import Block, ProgramFunction
 from tolcontact.statistics import BlockSums, DisplacementFields, TouchingShares
 from tolcontact.vocabulary import CORRECTED
@@ -39,31 +38,12 @@ def count_touching(
     """Return the counts at corrected poses (realization, part, 12), for deviations (realization, contributor)."""
     counts = [np.zeros(len(pair.P_m), dtype=np.int64) for pair in program.nominal.pairs]
     if len(poses) and counts:
-        relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(counts), -1)
-        for k, (gaps, points) in enumerate(zip(program.gaps, counts, strict=True)):
-            if program.nominal.pairs[k].elastic:
-                continue
-            X_RM = np.ascontiguousarray(relative[:, k])
-            if k in program.meetings:
-                points[:] = _nearest_counts(program, k, relative[:, k], deviations)
-            elif gaps is None:
-                distances = program.round_gaps[k](X_RM=X_RM, deviations=deviations)["distances"]
-                points[:] = (distances < terms.TOUCHING_GAP).sum(axis=0)
-            else:
-                kernel.count_below(gaps.basis, gaps.columns, gaps.coordinates, X_RM, deviations, terms.TOUCHING_GAP, points)
+        _, relative = program.observed(poses, deviations)
+        for k, pair in enumerate(program.nominal.pairs):
+            if not pair.elastic:
+                X_RM = np.ascontiguousarray(relative[:, k])
+                counts[k] = pair_search(program, k).touching_counts(X_RM, deviations, terms.TOUCHING_GAP)
     return TouchingCounts(np.concatenate([np.zeros(0, dtype=np.int64), *counts]), len(poses))
-
-
-def _nearest_counts(
-    program: Program, k: int, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]
-) -> Int[Array, " point"]:
-    """Return the counts of contacts of pair k, which are found at every pose, by the nearest contact point."""
-    pair = program.nominal.pairs[k]
-    raised = raised_places(pair, program.meetings[k], X_RM, deviations)
-    row, place = np.nonzero(raised.gaps < terms.TOUCHING_GAP)
-    _, nearest = KDTree(pair.P_m).query(raised.places.P_m[row, place])
-    realization_and_point = np.unique(np.column_stack([row, nearest]), axis=0)
-    return np.bincount(realization_and_point[:, 1], minlength=len(pair.P_m))
 
 
 BlockTotals = tuple[BlockSums, TouchingCounts]

@@ -12,7 +12,7 @@ from tests import cases
 from tests.helpers import nightly
 from tests.units.compilation.recompiling import recompiled
 from tolcontact.code_cache import cache_folder
-from tolcontact.compilation import contact_qp
+from tolcontact.compilation import contact_qp, contact_rows
 from tolcontact.compilation.calls import inline
 from tolcontact.compilation.functions import InterpretedFunction
 from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
@@ -21,8 +21,8 @@ from tolcontact.compilation.functions.operations import OPERATIONS
 from tolcontact.compilation.functions.translation import UnknownInstructionError
 from tolcontact.compilation.quadratic_terms import is_convex
 from tolcontact.discretization import discretize
-from tolcontact.mechanics.gap import gap_map, gap_matrix
 from tolcontact.mechanics.groups import contact_groups
+from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.simulation import simulate_blocks
 
 RNG = np.random.default_rng(5)
@@ -43,8 +43,9 @@ EXACT = tc.Method(resolution="exact", objective="locator stiffness")
 def test_compiled_functions_equal_interpreted_ones_to_the_last_bit(name, method):
     nominal = discretize(PLANAR[name]())
     for group in contact_groups(nominal, method):
-        gaps = [gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs]
-        qp = contact_qp.contact_qp(nominal, group, gaps, method)
+        pairs = [nominal.pairs[index] for index in group.pairs]
+        standing = [contact_rows.standing_points(pair, pair_gaps(pair).compiled(nominal.input_count), method) for pair in pairs]
+        qp = contact_qp.contact_qp(nominal, group, method, standing)
         for function in (qp.assemble, qp.finish):
             inputs = [RNG.normal(size=(7, function.nnz_in(k))) for k in range(function.n_in())]
             for found, expected in zip(NativeFunction(function)(inputs), InterpretedFunction(function)(inputs)[0], strict=True):

@@ -97,7 +97,7 @@ class RecordedQP(ContactQP):
 def qp_of(program, group, standing, *, is_summed):
     """The QP of a group of a program: summed over its pairs, or whole."""
     call = FunctionCalls() if is_summed else inline
-    return contact_qp(program.nominal, group, program.gaps, program.method, standing, call)
+    return contact_qp(program.nominal, group, program.method, standing, call)
 
 
 def recorded(program, samples):

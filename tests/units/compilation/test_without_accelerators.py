@@ -20,6 +20,7 @@ from tolcontact.compilation.contact_qp import ContactQP, Evaluators, contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.solver import SolverChoice
 from tolcontact.compilation.solvers import SOLVERS
+from tolcontact.mechanics import GapMap
 from tolcontact.simulation import simulate_block
 
 SOLUTION = ("x", "lam_a", "lam_x")
@@ -98,7 +99,7 @@ def plain(program):
     """The same program without accelerators."""
     choice, groups = OneByOne("one by one", fallbacks=("qpoases",)), []
     for group in program.groups:
-        qp = contact_qp(program.nominal, group.group, program.gaps, program.method, group.qp.standing, inline)
+        qp = contact_qp(program.nominal, group.group, program.method, group.qp.standing, inline)
         qp = PlainQP(**vars(qp))
         groups.append(ContactGroup(group.group, qp, ContactSolver(qp, choice)))
     return replace(
@@ -106,7 +107,7 @@ def plain(program):
         solver=choice,
         place=Interpreted(program.place.function),
         observe=Interpreted(program.observe.function),
-        round_gaps={k: Interpreted(function.function) for k, function in program.round_gaps.items()},
+        gaps=tuple(gaps if isinstance(gaps, GapMap) else Interpreted(gaps.function) for gaps in program.gaps),
         groups=tuple(groups),
     )
 

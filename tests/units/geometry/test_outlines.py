@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
 from tolcontact.geometry.outlines import hole_clearances, outline
+from tolcontact.geometry.places import Look
 from tolcontact.geometry.surface import Surface
 
 THICKNESS = 10.0
@@ -51,7 +52,7 @@ def test_the_least_gap_is_that_of_the_overlap_wherever_the_holes_are(seed, far):
         poses.append(np.r_[R.ravel(), t])
         expected.append(least_gap(upper, lower, R, t))
     for ceiling in (np.inf, -0.1, 0.05):
-        gaps = places.at(np.array(poses), ceilings=np.full(len(poses), ceiling)).gaps.min(axis=1, initial=np.inf)
+        gaps = places.at(np.array(poses), Look(ceilings=np.full(len(poses), ceiling))).gaps.min(axis=1, initial=np.inf)
         assert np.abs(gaps - expected).max() < 1e-5  # the library's solids have 32 bits
 
 
