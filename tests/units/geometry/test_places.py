@@ -11,6 +11,7 @@ from studies.certificates.placements import FAMILIES, scene
 from tests.helpers import nightly
 from tests.units.geometry.test_outlines import between, plate
 from tolcontact.geometry.meeting import MAX_POINTS
+from tolcontact.geometry.places import Look
 
 pytestmark = pytest.mark.filterwarnings("ignore::tolcontact.errors.NominalWarning")
 
@@ -34,7 +35,7 @@ def assert_same_places(meeting, X):
     for name, ours, theirs in zip(every._fields, meeting.at(X), every, strict=True):
         assert np.array_equal(ours, theirs), name
     for ceiling in (0.01, 0.2):
-        below = meeting.at(X, ceilings=np.full(len(X), ceiling))
+        below = meeting.at(X, Look(ceilings=np.full(len(X), ceiling)))
         for k in range(len(X)):
             expected = set(every.labels[k][every.gaps[k] <= ceiling])
             assert len(expected) == MAX_POINTS or expected <= set(below.labels[k])
