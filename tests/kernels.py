@@ -12,7 +12,7 @@ from tests.helpers import EXACT, SEATED, compiled
 from tests.test_properties import SCENES
 
 if __name__ == "__main__":
-    warnings.simplefilter("ignore", tc.NominalWarning)
+    warnings.simplefilter("ignore")
     for declare, method in SCENES.values():
         tc.run(declare(), method=method, solver="daqp", samples=4, surfaces=4)
     with tempfile.TemporaryDirectory() as folder:
