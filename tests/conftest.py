@@ -46,6 +46,8 @@ def pytest_collection_finish():
 def _freed_memory():
     """After a module, give the memory of what it made back to the system: hundreds of modules share a process."""
     yield
+    if sources := sys.modules.get("tests.sources"):
+        sources.tree.cache_clear()
     gc.collect()
     with contextlib.suppress(OSError, AttributeError):  # the C library may be another one
         ctypes.CDLL(None).malloc_trim(0)

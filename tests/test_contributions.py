@@ -11,7 +11,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER, call, nightly
+from tests.helpers import PAPER, call, compiled, nightly
 from tests.test_ra1 import MEASURED, TOP, plane_weights
 
 
@@ -68,7 +68,7 @@ def test_linear_percentages_name_the_wrong_contributor_of_ra1(of_ra1):
 def test_fixing_a_group_removes_its_share():
     """Total of all but base.A2, another way: the variance that is left when it is fixed, on average over where."""
     whole = tc.analyses.contributions(cases.model("ra1"), samples=2048, seed=5, solver="daqp")
-    program = tc.build(cases.model("ra1"), solver="daqp")
+    program = compiled(cases.model("ra1"), solver="daqp")
     column, left, f = list(program.nominal.contributors).index("base.A2"), [], []
     draws = program.draws(seed=77, start=0, stop=60 * 200)
     for k in range(60):
@@ -148,7 +148,7 @@ def test_what_only_contact_moves_has_no_linear_percentages(tmp_path):
 
 
 def test_an_option_that_cannot_act_is_refused():
-    program = tc.build(cases.one_dimensional(0), solver="daqp")
+    program = compiled(cases.one_dimensional(0), solver="daqp")
     for answer in (tc.analyses.contributions, tc.analyses.sensitivities):
         with pytest.raises(tc.OptionError, match="a Program has its solver and method"):
             answer(program, solver="daqp")
@@ -185,7 +185,7 @@ WEIGHTS = np.r_[2.0, -1.5, np.full(10, 0.7), np.full(56, 0.02)]  # of 68 causes
 @pytest.mark.parametrize("seeds", [range(2), *nightly(range(2, 22))])
 def test_minor_contributors_are_bounded_together_and_major_ones_keep_their_intervals(seeds):
     """A stack of 68 causes, and with contact max(0, sum): shares by closed form and by quadrature."""
-    program = tc.build(shelf({f"v{k}": w for k, w in enumerate(WEIGHTS)}), solver="daqp", method=PAPER)
+    program = compiled(shelf({f"v{k}": w for k, w in enumerate(WEIGHTS)}), solver="daqp", method=PAPER)
     shares = WEIGHTS**2 / (WEIGHTS**2).sum()
     truth = {"raw": (shares, shares), "corrected": of_clipped(tuple(WEIGHTS**2))}
     misses, minor_shares = np.zeros(4), shares[12:].sum()
@@ -204,7 +204,7 @@ def test_minor_contributors_are_bounded_together_and_major_ones_keep_their_inter
 
 
 def test_by_default_realizations_are_those_of_what_matters():
-    program = tc.build(shelf({f"v{k}": w for k, w in enumerate(WEIGHTS)}), solver="daqp", method=PAPER)
+    program = compiled(shelf({f"v{k}": w for k, w in enumerate(WEIGHTS)}), solver="daqp", method=PAPER)
     found = tc.analyses.contributions(program)
     assert 58_000 < found.attrs["realizations"] <= 60_000 and found.attrs["base_realizations"] == (60_000 - 8960) // 15
     half_widths = np.ptp(found["total"].sel(interval=["lower", "upper"]).values, axis=-1) / 2

@@ -4,8 +4,6 @@ import inspect
 import re
 import types
 
-import pytest
-
 import tolcontact as tc
 
 MODULES = {
@@ -34,12 +32,9 @@ def functions():
             yield f"tc.{owner.__name__}.{name}", getattr(owner, name)
 
 
-FUNCTIONS = dict(functions())
-
-
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_a_docstring_names_every_argument_and_has_an_example(name):
-    text = inspect.getdoc(FUNCTIONS[name])
-    arguments = [argument for argument in inspect.signature(FUNCTIONS[name]).parameters if argument != "self"]
-    assert not [argument for argument in arguments if not re.search(rf"\b{argument}\b", text)]
-    assert re.search(r"`[^`]*\b\w+\([^`]*\)[^`]*`|>>> ", text), "it has no example, such as `model.part(...)`"
+def test_docstrings_name_every_argument_and_have_an_example():
+    for name, function in functions():
+        text = inspect.getdoc(function)
+        arguments = [argument for argument in inspect.signature(function).parameters if argument != "self"]
+        assert not [argument for argument in arguments if not re.search(rf"\b{argument}\b", text)], name
+        assert re.search(r"`[^`]*\b\w+\([^`]*\)[^`]*`|>>> ", text), f"{name} has no example, such as `model.part(...)`"

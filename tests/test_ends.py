@@ -220,7 +220,7 @@ def test_deviations_beyond_all_that_were_tried_are_resolved_too(solver):
     a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=1)
     a.contact("seat", moving=block.face("-z"), reference=table.face("+z"))
     a.measure("height", block.point(0, 0, 0), along="z", tolerance=1)
-    program = tc.build(a, solver=solver)
+    program = compiled(a, solver=solver)
     (places,) = program.meetings.values()
     heights = np.array([-0.5, -3.0, 2.0, -5.0, -9.0, 30.0])
     deviations = np.zeros((6, 6))

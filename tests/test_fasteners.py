@@ -12,7 +12,7 @@ import tolcontact as tc
 from tests.cases import STILL, Frame
 from tests.cases.fastened import FOUR, THICKNESS, bolted, grown, held, hole, lying, most_room, placed, plate, shifts
 from tests.cases.floating import SEATED
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tolcontact.simulation import simulate_block
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 from tolcontact.vocabulary import CORRECTED, RAW, Status
@@ -25,7 +25,7 @@ AS1 = Path(__file__).resolve().parents[1] / "studies" / "cad" / "as1-oc-214.stp"
 
 def block_of(a: tc.Assembly, *deviations: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
     """Statuses, and least gaps (realization, state, pair) in holes, for deviations of some contributors."""
-    program = tc.build(a, solver="daqp")
+    program = compiled(a, solver="daqp")
     rows = [[row.get(label, 0.0) for label in program.nominal.contributors] for row in deviations]
     block = simulate_block(program, np.array(rows))
     return block.status, block.gap_min[:, :, : len(a.pairs)]

@@ -2,19 +2,23 @@
 
 import pytest
 
-import tolcontact as tc
-from tests.helpers import call
+from tests.helpers import assembly_of, call
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["bracket", "bracket.py", "été 2", "bracket.v2"])
-def test_it_is_checked_and_run_as_it_is(name, tmp_path):
+@pytest.mark.parametrize("name", ["bracket", "bracket.py", "bracket.v2"])
+def test_it_is_named_after_its_file(name, tmp_path):
     done = call(tmp_path, "new", name)
     path = tmp_path / f"{name.removesuffix('.py')}.py"
     assert (done.returncode, [*tmp_path.iterdir()]) == (0, [path]), done.stderr
-    assert tc.build(path).nominal.assembly.name == path.stem
+    assert assembly_of(path).name == path.stem
     assert "NAME" not in path.read_text(encoding="utf-8")
-    done = call(tmp_path, "run", path, "--samples", "100", "--surfaces", "8")
+
+
+def test_it_is_checked_and_run_as_it_is(tmp_path):
+    assert call(tmp_path, "new", "été 2").returncode == 0
+    done = call(tmp_path, "check", "été 2.py")
+    assert done.returncode == 0 and "no faults found" in done.stdout
+    done = call(tmp_path, "run", "été 2.py", "--samples", "100", "--surfaces", "8")
     assert done.returncode == 0 and "corner height (mm): displacement, limits -0.2 to 0.3" in done.stdout
 
 

@@ -9,11 +9,10 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests import cases
-from tests.cases import ends, fastened, fits, floating, laps, measured, round_contact, seats, stations, toleranced
+from tests.cases import ends, fastened, fits, floating, frames, laps, measured, round_contact, seats, stations, toleranced
 from tests.helpers import ALL_POINTS, EXACT, PAPER, SEATED, assert_same_archive, joined, nightly
 from tolcontact.testing import assert_datums_recompute, assert_gaps_recompute, assert_same_run
 
@@ -44,7 +43,6 @@ AT_NIGHT = {
 }
 # mm: where faces have form, places of contact are looked for on lines that depend on the frame.
 OF_FRAME = {"a fit with form": 5e-3, "a seat with form": 1e-4}
-TURN, SHIFT = Rotation.from_rotvec((0.4, -1.1, 0.7)), np.array((310.0, -170.0, 90.0))  # mm
 
 
 class Scene:
@@ -111,15 +109,7 @@ def test_neither_the_place_in_space_nor_the_order_of_declarations_changes_anythi
     """All parts, the directions of measures and the forces are turned and shifted; lists are declared from the end."""
 
     def turned(document):
-        for part in document["parts"]:
-            part["at"] = (TURN.apply(part["at"]) + SHIFT).tolist()
-            part["rotation"] = (TURN * Rotation.from_rotvec(part["rotation"])).as_rotvec().tolist()
-        for vectors, name in ((document["measures"], "along"), (document["forces"], "vector")):
-            for one in vectors:
-                if one.get(name) is not None:
-                    one[name] = TURN.apply(one[name]).tolist()
-        for angle in (measure["of"] for measure in document["measures"] if "about" in measure.get("of", ())):
-            angle["about"] = TURN.apply(angle["about"]).tolist()
+        frames.turn(document)
         for name in ("parts", "pairs", "measures", "locations", "forces"):
             document[name].reverse()
         document["measures"].sort(key=lambda measure: "measurements" in measure.get("of", ()))  # after those that they combine

@@ -7,7 +7,7 @@ import trimesh
 import tolcontact as tc
 from tests.cases import toleranced
 from tests.cases.fits import CLEARANCE, LENGTH, PULL, RADIUS, shaft_in_a_bore, shaft_on_a_table
-from tests.helpers import SEATED, simulate
+from tests.helpers import SEATED, compiled, simulate
 from tests.population_referee import measured_back
 from tests.test_form import coefficients
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
@@ -84,7 +84,7 @@ def radial_terms(azimuths, along):
 
 
 def test_a_roundness_displaces_no_section_and_a_straightness_no_line():
-    program = tc.build(shaft_in_a_bore(tc.Roundness(0.02), tc.Straightness(0.02)))
+    program = compiled(shaft_in_a_bore(tc.Roundness(0.02), tc.Straightness(0.02)))
     azimuths = np.arange(60) * 2 * np.pi / 60
     for feature, radius in (("shaft", RADIUS), ("bore", RADIUS + CLEARANCE)):
         z, angle = (grid.ravel() for grid in np.meshgrid(np.linspace(-20, 20, 41), azimuths, indexing="ij"))

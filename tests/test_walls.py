@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[1] / "tolcontact"
-FILES = sorted(PACKAGE.rglob("*.py"))
+from tests.sources import FILES, PACKAGE, tree
 
 # Who may import a library: folders and files, relative to the package.
 ROOMS = {
@@ -92,14 +91,14 @@ MODULES = {name_of(file) for file in FILES}
 
 def trees(file: Path) -> Iterator[ast.AST]:
     """The source of a module, and its stub, if it has one."""
-    yield ast.parse(file.read_text())
+    yield tree(file)
     if file.with_suffix(".pyi").exists():
         yield ast.parse(file.with_suffix(".pyi").read_text())
 
 
-def called(tree: ast.AST) -> Iterator[str]:
+def called(source: ast.AST) -> Iterator[str]:
     """Modules that are imported by a call: their names stand in it."""
-    for node in ast.walk(tree):
+    for node in ast.walk(source):
         if isinstance(node, ast.Call):
             function = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
             base = node.func.value if isinstance(node.func, ast.Attribute) else None
@@ -111,9 +110,9 @@ def called(tree: ast.AST) -> Iterator[str]:
 
 def imports(file: Path) -> set[str]:
     names = set()
-    for tree in trees(file):
-        names |= set(called(tree))
-        for node in ast.walk(tree):
+    for source in trees(file):
+        names |= set(called(source))
+        for node in ast.walk(source):
             if isinstance(node, ast.Import):
                 names |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
@@ -145,7 +144,7 @@ def breaches(file: Path) -> Iterator[str]:
                 yield f"{place} imports {name}, which stands below it"
             if target in APART.get(room(place), ()):
                 yield f"{place} imports {name}"
-    for name in called(ast.parse(file.read_text())):
+    for name in called(tree(file)):
         if not place.startswith(LAZY.get(name, ("nowhere",))):
             yield f"{place} imports {name} by a call"
 
@@ -175,7 +174,7 @@ def test_every_room_is_in_the_order():
 
 def test_no_import_is_hidden_in_a_function():
     for file in FILES:
-        for function in ast.walk(ast.parse(file.read_text())):
+        for function in ast.walk(tree(file)):
             if isinstance(function, ast.FunctionDef):
                 hidden = [n for n in ast.walk(function) if isinstance(n, ast.Import | ast.ImportFrom)]
                 assert not hidden, f"{file}: {function.name}"
@@ -190,9 +189,9 @@ def is_private(name: str) -> bool:
     return name.startswith("_") and not name.startswith("__") and name not in PUBLIC
 
 
-def intrusions(tree: ast.AST) -> Iterator[str]:
+def intrusions(source: ast.AST) -> Iterator[str]:
     """Names of the package that begin with an underscore, and changes of what was imported from it, with their lines."""
-    nodes = list(ast.walk(tree))
+    nodes = list(ast.walk(source))
     imported = [
         (alias.asname or alias.name.split(".")[0], f"{getattr(node, 'module', '')}.{alias.name}", node.lineno)
         for node in nodes
@@ -218,14 +217,14 @@ def intrusions(tree: ast.AST) -> Iterator[str]:
 
 def test_modules_import_no_private_name_of_another():
     for file in FILES:
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree(file)):
             names = [alias.name for alias in node.names if is_private(alias.name)] if isinstance(node, ast.ImportFrom) else []
             assert not names, f"{file.relative_to(PACKAGE)}: {', '.join(names)}"
 
 
 def test_tests_reach_no_private_name_and_change_no_module():
     files = sorted(Path(__file__).parent.rglob("*.py"))
-    found = [f"{file.name} {text}" for file in files for text in intrusions(ast.parse(file.read_text(encoding="utf-8")))]
+    found = [f"{file.name} {text}" for file in files for text in intrusions(tree(file))]
     assert not found, "\n".join(found)
 
 
@@ -270,9 +269,9 @@ def exports(room: str) -> set[str]:
     return {alias.asname or alias.name for node in imported for alias in node.names}
 
 
-def reaches(tree: ast.AST) -> Iterator[tuple[str, str]]:
+def reaches(source: ast.AST) -> Iterator[tuple[str, str]]:
     """Modules of rooms that are imported, each with its room, though the room itself is what others may import."""
-    for node in ast.walk(tree):
+    for node in ast.walk(source):
         if isinstance(node, ast.Import):
             names = {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -288,7 +287,7 @@ def test_only_tests_of_a_room_reach_into_it():
     """Tests of a room stand in `tests/units/ROOM`; they may reach into rooms that stand before it, too."""
     found, insiders = [], set()
     for file in sorted(TESTS.rglob("*.py")):
-        place, reached = file.relative_to(TESTS), list(reaches(ast.parse(file.read_text(encoding="utf-8"))))
+        place, reached = file.relative_to(TESTS), list(reaches(tree(file)))
         if UNITS in file.parents:
             own = ORDER.index(place.parts[1]) if len(place.parts) > 2 else -1
             found += [f"{place} imports {name}" for target, name in reached if ORDER.index(target) > own]
@@ -302,7 +301,7 @@ def test_only_tests_of_a_room_reach_into_it():
 
 def test_no_other_test_needs_the_tests_of_a_room():
     for file in {*TESTS.rglob("*.py")} - {*UNITS.rglob("*.py")}:
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree(file)):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", None) or ""]
             assert not [name for name in names if name.startswith("tests.units")], f"{file}: line {node.lineno}"
 

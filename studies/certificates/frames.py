@@ -18,13 +18,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases import frames
+from tests.cases.frames import SHIFT, TURN
 from tests.test_properties import AT_NIGHT, SCENES
 
-TURN, SHIFT = Rotation.from_rotvec((0.4, -1.1, 0.7)), np.array((310.0, -170.0, 90.0))  # mm
 FACTORS = 0.01, 1 / 128, 100.0
 IMAGE = " image"
 # Keys of a declaration whose numbers are lengths
@@ -63,13 +62,7 @@ class Original:
         """Return how far poses of the turned assembly differ [sizes], and whether its statuses are equal."""
 
         def change(document: Any) -> Any:
-            for part in document["parts"]:
-                part["at"] = (TURN.apply(part["at"]) + SHIFT).tolist()
-                part["rotation"] = (TURN * Rotation.from_rotvec(part["rotation"])).as_rotvec().tolist()
-            for vectors, name in ((document["measures"], "along"), (document["forces"], "vector")):
-                for entry in vectors:
-                    if entry.get(name) is not None:
-                        entry[name] = TURN.apply(entry[name]).tolist()
+            frames.turn(document)
             return document
 
         run, T = self.changed(change), TURN.as_matrix()

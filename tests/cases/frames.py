@@ -2,6 +2,7 @@
 
 import runpy
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,6 +10,7 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
+TURN, SHIFT = Rotation.from_rotvec((0.4, -1.1, 0.7)), np.array((310.0, -170.0, 90.0))  # mm
 
 
 def model(name: str, *choices) -> tc.Assembly:
@@ -33,3 +35,15 @@ class Frame:
 
 
 STILL = Frame()
+
+
+def turn(document: dict[str, Any]) -> None:
+    """Turn and shift all parts of a declaration, and the directions of its measures and forces."""
+    for part in document["parts"]:
+        part["at"] = (TURN.apply(part["at"]) + SHIFT).tolist()
+        part["rotation"] = (TURN * Rotation.from_rotvec(part["rotation"])).as_rotvec().tolist()
+    angles = [measure["of"] for measure in document["measures"] if "about" in measure.get("of", ())]
+    for entries, name in ((document["measures"], "along"), (document["forces"], "vector"), (angles, "about")):
+        for entry in entries:
+            if entry.get(name) is not None:
+                entry[name] = TURN.apply(entry[name]).tolist()

@@ -103,7 +103,7 @@ class ArchiveWriter:
         check_room(path, program.nominal, kept_rows(program.nominal, run.keep), run.samples)
         with replacing_archive(path) as part, open_netcdf(part, "w") as file:
             write_header(file, program, run, sums)
-        self._start(path, program, run)
+            self._start(file, path, program, run)
         self._journal.remove()
 
     @classmethod
@@ -116,27 +116,26 @@ class ArchiveWriter:
         with open_netcdf(path, "r") as file:
             check_same_run(file, path, program, run_settings(program, run), run.surfaces)
             software = "" if file.versions == versions() else f" with {versions()}"
+            writer = cls.__new__(cls)
+            writer._start(file, path, program, run)
         with open_unchecked(path) as results:
             check_rows(results)
-        writer = cls.__new__(cls)
-        writer._start(path, program, run)
         writer._take_journal()
         check_room(path, program.nominal, writer.kept, writer.samples - writer.rows)
         writer._resumed = f"\n{now()} resumed after {writer.rows} realizations{software}"
         return writer
 
-    def _start(self, path: Path, program: Program, run: Run) -> None:
+    def _start(self, file: netCDF4.Dataset, path: Path, program: Program, run: Run) -> None:
         self._path = self._current = path
         self._parts, self._pairs = [part.name for part in program.nominal.last_parts], len(program.nominal.pairs)
         self._stations, self._checked = [scene.station for scene in program.nominal.scenes], run.surfaces
         self._checkpoint_interval, self._since, self._resumed = run.checkpoint_interval, time.monotonic(), ""
-        with open_netcdf(path, "r") as file:
-            rows = kept_rows(program.nominal, run.keep)  # an earlier version wrote fewer
-            self.kept = tuple(row for row in rows if row.variable.name in (file[row.group] if row.group else file).variables)
-            self.rows = self._start_row = int(file[terms.SUMMED_ROWS.name][...])
-            self.samples, self._block_rows = max(run.samples, int(file.samples)), int(file.block_rows)
-            sums = [file[terms.field_of(part)][terms.FIELD_SUMS.name][...] for part in self._parts]
-            self._checkpoint = Checkpoint(file.history, self.rows, 0, 0, self.samples, sums if self.rows else [])
+        rows = kept_rows(program.nominal, run.keep)  # an earlier version wrote fewer
+        self.kept = tuple(row for row in rows if row.variable.name in (file[row.group] if row.group else file).variables)
+        self.rows = self._start_row = int(file[terms.SUMMED_ROWS.name][...])
+        self.samples, self._block_rows = max(run.samples, int(file.samples)), int(file.block_rows)
+        sums = [file[terms.field_of(part)][terms.FIELD_SUMS.name][...] for part in self._parts]
+        self._checkpoint = Checkpoint(file.history, self.rows, 0, 0, self.samples, sums if self.rows else [])
         self._journal = Journal(path, self.kept, self._block_rows)
 
     def _take_journal(self) -> None:
@@ -195,7 +194,7 @@ class ArchiveWriter:
     def completed(self, groups: Mapping[str, Mapping[terms.ArchiveVariable, Any]]) -> Iterator[None]:
         """Replace the archive by one with all rows, with the last checkpoint, and with the values of `groups`.
 
-        Until it does so at the end of the block, `rows_to_check`, `poses` and `write_checked` refer to the new archive.
+        Until it does so at the end of the block, `rows_to_check` and `write_checked` refer to the new archive.
         """
         with contextlib.ExitStack() as stack:
             with _as_archive_error(self._path):
@@ -220,15 +219,14 @@ class ArchiveWriter:
                 stack.close()
         self._journal.remove()
 
-    def rows_to_check(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the numbers (row,) of the realizations to check against the surfaces, and whether each is a random choice."""
-        with open_netcdf(self._current, "r") as file:
-            return choose(file, self._checked, seed)
+    def rows_to_check(self, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        """Return the numbers (row,) of the realizations to check against the surfaces, and whether each is a random choice.
 
-    def poses(self, rows: np.ndarray) -> np.ndarray | None:
-        """Return corrected poses (row, part, 12) of some rows; None if they are not kept."""
+        With their corrected poses (row, part, 12), or None if they are not kept.
+        """
         with open_netcdf(self._current, "r") as file:
-            return archived_poses(file, rows, self._stations)
+            rows, at_random = choose(file, self._checked, seed)
+            return rows, at_random, archived_poses(file, rows, self._stations) if rows.size else None
 
     def first_poses(self, end: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the numbers (row,) of the first rows, before `end`, that are not `searched`, and their corrected poses.

@@ -279,9 +279,8 @@ def _commit(writer: ArchiveWriter, sums: RunSums, rows: dict[str, np.ndarray], b
 
 def _check(program: Program, writer: ArchiveWriter, seed: int) -> None:
     """Check some rows of an archive against the surfaces."""
-    rows, at_random = writer.rows_to_check(seed)
+    rows, at_random, stored_poses = writer.rows_to_check(seed)
     if rows.size:
-        stored_poses = writer.poses(rows)
         deviations = program.draws.rows(rows, seed=seed)
         poses = simulated_poses(program, deviations) if stored_poses is None else stored_poses
         surfaces = check_surfaces(program, poses, deviations)

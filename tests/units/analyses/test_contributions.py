@@ -27,7 +27,7 @@ def test_mixtures_do_not_depend_on_blocks_and_exchange_columns():
 def test_what_is_drawn_together_is_one_group():
     a = cases.stack()
     a.correlate(["upper.A1", "middle.A1"], [[1, 0.8], [0.8, 1]])
-    program = tc.build(a, solver="daqp")
+    program = compiled(a, solver="daqp")
     labels = list(program.nominal.contributors)
     groups = independent_groups(program.draws, labels, np.ones(len(labels), dtype=bool))
     assert "middle.A1 + upper.A1" in groups or "upper.A1 + middle.A1" in groups
@@ -48,7 +48,7 @@ def test_shapley_effects_divide_what_is_correlated():
     assert of_normal([first, second], [[1, rho], [rho, 1]]) == pytest.approx([own, 1 - own])
     a = cases.stack()
     a.correlate(CORRELATED, MATRIX)
-    program = tc.build(a, solver="daqp", method=PAPER)
+    program = compiled(a, solver="daqp", method=PAPER)
     found = tc.analyses.contributions(program, samples=4096).sel(measure="top")
     columns = [list(program.nominal.contributors).index(label) for label in (*CORRELATED, "upper.A2")]
     slopes = linear_model(program).by_deviations[0, columns]
@@ -65,7 +65,7 @@ def test_shapley_effects_divide_what_is_correlated():
 def test_released_draws_do_not_depend_on_blocks_and_keep_correlations():
     a = cases.stack()
     a.correlate(CORRELATED, MATRIX)
-    program = tc.build(a, solver="daqp")
+    program = compiled(a, solver="daqp")
     labels = list(program.nominal.contributors)
     columns = [labels.index(label) for label in CORRELATED]
     released = ReleasedDraws(

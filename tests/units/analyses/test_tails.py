@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-import tolcontact as tc
 from tests import cases
-from tests.helpers import SEATED
+from tests.helpers import SEATED, compiled
 from tolcontact.analyses.analysis import Engine
 from tolcontact.analyses.tails import NotAssemblable
 from tolcontact.simulation import map_blocks
@@ -15,7 +14,7 @@ from tolcontact.variation.plans import uniform
 @pytest.mark.slow
 def test_normal_scores_are_drawn_as_in_a_run():
     """Two square pins in two slots, rotations alone; larger deviations do not make assembly possible again."""
-    program = tc.build(cases.square_pins("rotations"), solver="daqp", method=SEATED)
+    program = compiled(cases.square_pins("rotations"), solver="daqp", method=SEATED)
     score = NotAssemblable(Engine(program, map_blocks))
     u = np.random.default_rng(3).standard_normal((24, len(program.draws.varying)))
     stuck = np.stack([score(factor * u) for factor in 1.3 ** np.arange(7)])

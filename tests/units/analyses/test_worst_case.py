@@ -10,7 +10,7 @@ import tolcontact as tc
 from tests import cases
 from tests.cases import toleranced
 from tests.cases.fasteners import fasteners
-from tests.helpers import PAPER, nightly
+from tests.helpers import PAPER, compiled, nightly
 from tests.test_datums import plate
 from tests.test_worst_case import small_ra1, values
 from tolcontact import vocabulary as terms
@@ -57,7 +57,7 @@ def test_a_clutch_has_the_worst_cases_of_its_formula():
 
 
 def test_what_is_found_is_what_the_engine_says_of_the_combination():
-    program = tc.build(small_ra1(), solver="daqp")
+    program = compiled(small_ra1(), solver="daqp")
     found = few_searches(program, 64)
     assert few_searches(program, 64).equals(found)
     for state in (0, 1):
@@ -75,7 +75,7 @@ def with_idle_parts(a, count):
 
 
 def influences_of(a, count=16):
-    program, rng = tc.build(a, solver="daqp"), np.random.default_rng(1)
+    program, rng = compiled(a, solver="daqp"), np.random.default_rng(1)
     area = AllowedRegion(program.draws, seed=1)
     points = area.scattered(rng, count)
     evaluation = Evaluation(Engine(program, map_blocks), area)
@@ -100,7 +100,7 @@ def test_influences_are_those_of_contact_too():
 
 def test_an_influence_that_shows_only_at_some_points_is_found_there():
     """The height max(0, z) does not change between two points below, and does between one below and one above."""
-    program = tc.build(cases.one_dimensional(0), solver="daqp", method=PAPER)
+    program = compiled(cases.one_dimensional(0), solver="daqp", method=PAPER)
     area = AllowedRegion(program.draws, seed=1)
     influences = Influences(area, Evaluation(Engine(program, map_blocks), area), np.ones(1))
     is_height = np.array([label == "block.Z" for label in program.nominal.contributors])

@@ -9,7 +9,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tests.units.compilation.recompiling import recompiled
 from tolcontact.code_cache import cache_folder
 from tolcontact.compilation import contact_qp, contact_rows
@@ -135,7 +135,7 @@ EVERY = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "rollers": 
 def test_few_rows_give_what_all_rows_give(name, resolution):
     """Curved contact and several bodies included: the same QPs, once with the rows that are found, once with every row."""
     make = EVERY[name]
-    few = tc.build(make(), solver="daqp", method=tc.Method(resolution=resolution, search="fixed"))
+    few = compiled(make(), solver="daqp", method=tc.Method(resolution=resolution, search="fixed"))
     every = recompiled(few, standing=[np.arange(len(pair.P_m)) for pair in few.nominal.pairs])
     assert any(len(g.qp.standing[0]) > 4 for g in every.groups)
     blocks = [next(simulate_blocks(program, samples=24, seed=8)) for program in (few, every)]

@@ -7,8 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-import tolcontact as tc
-from tests.helpers import nightly, run, script
+from tests.helpers import compiled, nightly, run, script
 from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.solvers import SOLVERS
 from tolcontact.simulation import simulate_blocks
@@ -228,7 +227,7 @@ def test_answers_do_not_depend_on_the_problems_before(kind):
 
 def poses_and_status(model, plugin, method, samples, block=1000):
     assembly = runpy.run_path(str(MODELS / f"{model}.py"))["assembly"]()
-    program = tc.build(assembly, solver=plugin, method=method)
+    program = compiled(assembly, solver=plugin, method=method)
     blocks = list(simulate_blocks(program, samples=samples, seed=1, block=block))
     return [np.concatenate([getattr(part, name) for part in blocks]) for name in ("poses", "status", "second_answers")]
 

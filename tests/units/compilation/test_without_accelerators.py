@@ -13,7 +13,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tolcontact.compilation import ContactGroup, NamedFunction
 from tolcontact.compilation.calls import inline
 from tolcontact.compilation.contact_qp import ContactQP, Evaluators, contact_qp
@@ -131,7 +131,7 @@ def plain(program):
     ],
 )
 def test_models_have_the_same_answers_without_accelerators(model, resolution, solver, accuracy):
-    program = tc.build(cases.model(model), solver=solver, method={"resolution": resolution})
+    program = compiled(cases.model(model), solver=solver, method={"resolution": resolution})
     deviations = program.draws(seed=2, start=0, stop=12)
     fast = simulate_block(program, deviations)
     calls, solved = Interpreted.calls, SingleSolver.solved

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-import tolcontact as tc
 from tests.cases.seats import seat
+from tests.helpers import compiled
 from tests.units.contact import plain_scan
 from tolcontact.contact.raised_scan import raised_scan
 from tolcontact.contact.scan import pair_scan
 
 
 def test_heights_that_are_summed_up_once_give_the_same_deepest_points():
-    program = tc.build(seat())
+    program = compiled(seat())
     pair, gaps = program.nominal.pairs[0], program.gaps[0]
     deviations = program.draws(seed=3, start=0, stop=50)
     poses = program.place(deviations=deviations)["poses"]

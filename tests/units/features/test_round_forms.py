@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests.cases.fits import shaft_in_a_bore
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tests.test_round_forms import form_of, radial_terms
 from tolcontact.features.minimum_zone import minimum_widths
 
@@ -21,7 +21,7 @@ def width_by_programme(terms, heights):
 
 @pytest.mark.parametrize("tolerance", [tc.Cylindricity(0.05), *nightly(tc.Roundness(0.05), tc.Straightness(0.05))], ids=str)
 def test_zones_of_cylinders_are_those_of_a_linear_programme(tolerance):
-    program = tc.build(shaft_in_a_bore(tolerance))
+    program = compiled(shaft_in_a_bore(tolerance))
     field = form_of(program, "shaft")
     spread = program.draws.contributors[len(program.nominal.contributors) - 1].spread
     heights = np.random.default_rng(1).normal(0, spread, (8, field.modes)) @ field.heights(field.places).T

@@ -5,6 +5,7 @@ import pytest
 
 import tolcontact as tc
 from models import hinge
+from tests.helpers import compiled
 from tolcontact.simulation import simulate_block
 from tolcontact.statistics.sobol_indices import sobol_indices
 
@@ -47,7 +48,7 @@ def lowest(places, floors):
 
 @pytest.fixture(scope="module")
 def program():
-    return tc.build(hinge.assembly(place=1e-9), solver="daqp")
+    return compiled(hinge.assembly(place=1e-9), solver="daqp")
 
 
 @pytest.mark.slow
