@@ -15,6 +15,7 @@ from tolcontact.contact.slots import Slots
 from tolcontact.contact.standing_search import StandingSearch
 from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task
+from tolcontact.geometry.kernel import TINY
 from tolcontact.geometry.parting import Parting
 from tolcontact.interference.watch import ALLOWED_SHARE
 
@@ -115,13 +116,14 @@ class Candidates:
         return found
 
     def slants(self, state: State) -> Float[Array, " n"]:
-        """Return the largest slant of rims under load that cross, in realizations (n,), see Meeting.slants."""
-        largest, loaded = np.zeros(len(state)), state.loaded
+        """Return the mean slant of contact under load, in realizations (n,), see Meeting.slants, weighted by reactions."""
+        total, loaded = np.zeros(len(state)), state.loaded
         for k, pair in self.bounded.items():
             row, slot = np.nonzero(loaded[:, self._spans[k]])
             labels = state.slots[self._varying.index(k)].labels[row, slot]
-            np.maximum.at(largest, row, pair.meeting.slants(state.relative[row, k], labels))
-        return largest
+            slants = pair.meeting.slants(state.relative[row, k], labels)
+            total += np.bincount(row, slants * state.multipliers[:, self._spans[k]][row, slot], minlength=len(state))
+        return total / np.maximum(state.multipliers.sum(axis=1), TINY)
 
     @property
     def are_guarded(self) -> bool:

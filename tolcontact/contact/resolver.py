@@ -30,7 +30,7 @@ from tolcontact.interference import ordered
 SAME_CONFLICT = 1e-3  # conflicts whose penetration differs by less than this share count as the same
 UNMOVED = 1e-9  # mm: contact moves bodies by more
 MIN_GAIN = 1e-6  # mm of penetration: the gain for which another start is preferred
-MIN_SLANT = 0.02  # rad: rims whose gap has a smaller slope lose less than a thousandth of the objective
+MIN_SLANT = 0.02  # rims whose gap has a smaller slant lose less than a thousandth of the objective, in experience
 
 
 class ContactResolver:

@@ -113,10 +113,9 @@ class Meeting:
         return replace(self, slant=1.0)
 
     def slants(self, X_RM: Float[Array, "n 12"], labels: Int[Array, " n"]) -> Float[Array, " n"]:
-        """Return the tangents of the angles between the slope of the gap and the plane's normal, at poses (n, 12).
+        """Return the tangents of the angles between slopes of gaps and the normals that rows have instead, at poses (n, 12).
 
-        Only candidates where rims of facing planes cross have a slope that differs; of others, and of those of extended
-        meetings, 0 is returned.
+        This is 0 but for candidates where rims of facing planes cross, and there if the slope counts already.
         """
         found, candidates = np.zeros(len(labels)), self.candidates
         rows = np.flatnonzero((labels >= 0) & (labels < len(self)))
@@ -129,7 +128,8 @@ class Meeting:
         n = self.reference.normals[candidates.facing[candidates.planes[chosen], 1]]
         c = np.cross(d, e)
         across = np.abs((c * n).sum(axis=1))
-        found[rows] = np.linalg.norm(np.cross(c, n), axis=1) / np.maximum(across, kernel.TINY)
+        slant = np.linalg.norm(np.cross(c, n), axis=1) / np.maximum(across, kernel.TINY)
+        found[rows] = np.where(1 + slant**2 < self.slant**2, slant, 0.0)
         return found
 
     @property
