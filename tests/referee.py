@@ -107,7 +107,7 @@ def gaps(pair, R, t, deviations=None):
     """
     drawn = None if deviations is None else np.atleast_2d(deviations)
     (R_m, t_m, h_m), (R_r, t_r, h_r) = ((each[0] for each in side) for side in faces(pair, R[None], t[None], drawn))
-    if pair.round:
+    if not pair.samples_faces:
         return np.array([p.gaps(R_r.T @ R_m, R_r.T @ (t_m - t_r), h_m, h_r) for p in as_archived(pair.round)])
     n = pair.n_r @ R_r.T
     n /= np.linalg.norm(n, axis=1, keepdims=True)
