@@ -1,6 +1,6 @@
 """Probabilities of rare events: a measure outside its limits, or parts that cannot be assembled."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,16 +11,18 @@ from scipy.special import gammaincc, ndtr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis, Engine, Progress
+from tolcontact.analyses.answers import Answer
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.method import Solver
-from tolcontact.statistics.intervals import UNDEFINED
+from tolcontact.statistics.intervals import UNDEFINED, proportion
 from tolcontact.statistics.rare import NEGLIGIBLE, Tail, either, sufficient_tail
 from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 
 MIN_SAMPLES = 30_000  # for a search: fewer see too few of an event's regions (studies/verification)
+COUNTED = 1000  # realizations of the first answer, by counting
 MIN_AT_STOP = 50  # values at a limit that is never exceeded
 UNDEFINED_TAIL = Tail(UNDEFINED, 1.0)
 
@@ -28,7 +30,7 @@ UNDEFINED_TAIL = Tail(UNDEFINED, 1.0)
 def tails(
     model: Model | Program, *, samples: int | None = None, seed: int = 1, solver: Solver | None = None,
     method: Choice | None = None, into: str | Path | None = None, client: Any = None,
-    progress: Progress | None = None,
+    progress: Progress | None = None, minutes: float | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return probabilities of rare events (see tolcontact.statistics.rare).
 
@@ -58,13 +60,34 @@ def tails(
         raise OptionError(f"samples is {samples!r}; expected at least {MIN_SAMPLES} realizations for each limit")
     analysis = Analysis(
         terms.TAILS, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
-        progress=progress,
+        progress=progress, minutes=minutes,
     )  # fmt: skip
     program = analysis.program
     analysis.check_varies(program.draws.varying)
-    events = _events(program)
-    engine, dimensions = analysis.engine(sum(map(len, events.values())) * samples), len(program.draws.varying)
-    event_tails, statuses, stops = [], [], []
+    return analysis.finest(_answers(analysis, _events(program)))
+
+
+def _answers(analysis: Analysis, events: "dict[str, list[Callable[[Engine], Any]]]") -> Iterator[Callable[[], Answer]]:
+    """Yield an answer by counting, and answers by searches for one event after the other."""
+    samples, dimensions = analysis.samples, len(analysis.program.draws.varying)
+    engine = analysis.engine(sum(map(len, events.values())) * samples)
+    found: list[tuple[Tail, bool, np.ndarray]] = []  # for each event: its tail, whether a limit is a stop, and statuses
+
+    def answer() -> Answer:
+        searched = [f"{number} of {len(events)} events are searched for"] if found else []
+        rest = f"the {'others' if found else 'events'} are counted among {COUNTED} realizations"
+        entries = found + counted[len(found) :]
+        values = {
+            "probability": [tail.probability for tail, *_ in entries],
+            "disagreement": [tail.disagreement for tail, *_ in entries],
+            "stop": np.array([is_stop for _, is_stop, _ in entries], dtype=np.int8),
+            "simulated": [int(statuses.sum()) for *_, statuses in entries],
+            "by_status": [statuses for *_, statuses in entries],
+        }
+        return Answer(values, {terms.EVENT: list(events)}, {"samples": samples}, "; ".join([*searched, rest]))
+
+    counted = _counted(analysis, engine, list(events.values()), dimensions)
+    yield answer
     for number, sides in enumerate(events.values()):
         before, scores, side_tails = engine.statuses.copy(), [make_score(engine) for make_score in sides], []
         for side, score in enumerate(scores):  # each has its own region, and could hide the region of the other
@@ -72,17 +95,24 @@ def tails(
             side_tails.append(sufficient_tail(score, dimensions, samples=samples, rng=rng, leads=score.leads))
         # If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
         exceedable = [tail for score, tail in zip(scores, side_tails, strict=True) if not score.is_stop] or side_tails
-        event_tails.append(UNDEFINED_TAIL if any(score.is_undefined for score in scores) else either(exceedable))
-        stops.append(any(score.is_stop for score in scores))
-        statuses.append(engine.statuses - before)
-    values = {
-        "probability": [tail.probability for tail in event_tails],
-        "disagreement": [tail.disagreement for tail in event_tails],
-        "stop": np.array(stops, dtype=np.int8),
-        "simulated": np.sum(statuses, axis=1),
-        "by_status": statuses,
-    }
-    return analysis.dataset(values, {terms.EVENT: list(events)}, samples=samples)
+        tail = UNDEFINED_TAIL if any(score.is_undefined for score in scores) else either(exceedable)
+        found.append((tail, any(score.is_stop for score in scores), engine.statuses - before))
+        yield answer
+
+
+def _counted(
+    analysis: Analysis, engine: Engine, events: "list[list[Callable[[Engine], Any]]]", dimensions: int
+) -> list[tuple[Tail, bool, np.ndarray]]:
+    """Return the shares of the events among the same realizations."""
+    u = np.random.default_rng([analysis.seed, len(events)]).standard_normal((COUNTED, dimensions))
+    engine.total += COUNTED
+    simulated, found = simulated_scores(engine, u), []
+    for sides in events:
+        scores = [make_score(engine) for make_score in sides]
+        hits = np.any([score.of(*simulated, u) > 0 for score in scores], axis=0)
+        tail = UNDEFINED_TAIL if any(score.is_undefined for score in scores) else Tail(proportion(hits), 1.0)
+        found.append((tail, False, np.bincount(simulated[1], minlength=len(engine.statuses))))
+    return found
 
 
 def simulated_scores(engine: Engine, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -130,7 +160,10 @@ class _Beyond:
         self.is_undefined = False
 
     def __call__(self, u: np.ndarray) -> np.ndarray:
-        measured, _ = simulated_scores(self._engine, u)
+        return self.of(*simulated_scores(self._engine, u), u)
+
+    def of(self, measured: np.ndarray, _: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the scores (n,) of measures (n, state, measure) at normal scores u (n, d)."""
         is_likely = gammaincc(u.shape[1] / 2, (u**2).sum(axis=1) / 2) > NEGLIGIBLE  # otherwise only inflation leads there
         self.is_undefined |= bool(np.isnan(measured[is_likely, terms.CORRECTED, self._measure]).any())
         excess = np.nan_to_num(self._limits.excess(measured[:, terms.CORRECTED, self._measure]), nan=-np.inf, posinf=np.inf)
@@ -153,5 +186,8 @@ class NotAssemblable:
         self._engine = engine
 
     def __call__(self, u: np.ndarray) -> np.ndarray:
-        _, status = simulated_scores(self._engine, u)
+        return self.of(*simulated_scores(self._engine, u), u)
+
+    def of(self, _: np.ndarray, status: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the scores (n,) of statuses (n,) at normal scores u (n, d)."""
         return np.where(status == terms.Status.NOT_ASSEMBLABLE, 1.0, -1.0)

@@ -1,14 +1,12 @@
 """The brief summary: of many measurements, parts and pairs those that fall short, and how many others there are."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.results_table import verdict_of
-from tolcontact.report.table import Table
 from tolcontact.statistics.capability import CONSTANT, FAILS, MEETS, UNDECIDED
 
 MOST_DETAILED, MOST_LISTED = 3, 6  # measurements with all their figures; measurements, parts or pairs in a table
@@ -45,19 +43,6 @@ def brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
     counts = {phrase: sum(verdict in group for verdict in remainder) for phrase, group in phrases.items()}
     remark = ", ".join(f"{number} more {phrase}" for phrase, number in counts.items() if number)
     return summary.isel(measure=selection), f"{remark}; {EVERYTHING}"
-
-
-def brief_table(table: Table, weights: Sequence[float] | np.ndarray, phrase: str, rows_of_each: int = 1) -> Table:
-    """Return a table of the items with the largest weights (item,), each of several rows.
-
-    A remark has the number of the other items, and a `phrase` about them.
-    """
-    if len(weights) <= MOST_LISTED:
-        return table
-    selection = [index for index in _largest(weights, MOST_LISTED) if weights[index] > 0]
-    rows = [row for index in selection for row in table.rows[index * rows_of_each : (index + 1) * rows_of_each]]
-    remark = f"{len(weights) - len(selection)} more {phrase}; {EVERYTHING}"
-    return replace(table, rows=rows, remarks=[*table.remarks, remark])
 
 
 def _largest(weights: Sequence[float] | np.ndarray, count: int) -> list[int]:
