@@ -1,10 +1,10 @@
 """Resolve the same draws by every solver at the default method: poses, statuses and CPU time, as a figure and two tables.
 
-    python -m studies.solvers.draws [--models ra1 ...] [--turns 3] [--draws 500] [--seconds 60] [--references 20] [--to FOLDER]
+    python -m studies.solvers.draws [--models ra1 ...] [--turns 3] [--draws 500] [--seconds 20] [--references 20] [--to FOLDER]
 
-Solvers run in processes of their own, since they may crash or never return, and take turns. A turn is some draws, the same for
-all of them. Reference poses are medians over the solvers. For stacks of boxes they are compared with an interior-point search
-that shares no code with the simulation (studies.certificates.optima).
+Solvers run in processes of their own, since they may crash or never return, and take turns; each turn has the same draws.
+Reference poses are medians over the solvers. For stacks of boxes they are compared with an interior-point search that shares
+no code with the simulation (studies.certificates.optima).
 """
 
 import argparse
@@ -51,7 +51,7 @@ class Answers(NamedTuple):
     poses   (n, part, 12)
     status  (n,)
     costs   (turn,): CPU time per realization [us]
-    note    why it has not answered all draws; "" if it has
+    note    "does not return" or "crashes" in a later turn; otherwise ""
     """
 
     poses: np.ndarray
@@ -61,26 +61,26 @@ class Answers(NamedTuple):
 
 
 class Contender:
-    """A solver in a process of its own, which answers the draws of a turn."""
+    """A solver in a process of its own, which answers the same draws in each turn; a slow one answers only the first ones."""
 
-    def __init__(self, assembly: tc.Assembly, solver: str) -> None:
+    def __init__(self, assembly: tc.Assembly, solver: str, draws: int, seconds: float) -> None:
         context = multiprocessing.get_context("fork")
         self._pipe, remote = context.Pipe()
         self._process = context.Process(target=_serve, args=(remote, assembly, solver), daemon=True)
         self._process.start()
         remote.close()
-        self.turns, self.note, self.seconds = list[tuple[np.ndarray, np.ndarray, float]](), "", 0.0
+        self.turns, self.note, self._draws = list[tuple[np.ndarray, np.ndarray, float]](), "", WARM_DRAWS
         for _ in range(WARM_UP):  # before the next solver starts, which then finds the compiled functions
-            self.take(0, WARM_DRAWS, np.inf)
-        self.turns, self.seconds = [], 0.0
+            self.take()
+        if self.turns:
+            self._draws = int(np.clip(1e6 * seconds / self.turns[-1][2], WARM_DRAWS, draws))
+        self.turns = []
 
-    def take(self, start: int, stop: int, limit: float) -> None:
-        """Answer draws `start` to `stop`, unless the solver has stopped or has taken more than `limit` seconds of CPU time."""
-        if not self.note and self.seconds > limit:
-            self.note = f"stopped after {limit:.0f} s"
+    def take(self) -> None:
+        """Answer the draws once, unless the solver has stopped."""
         if self.note:
             return
-        self._pipe.send((start, stop))
+        self._pipe.send(self._draws)
         try:
             if not self._pipe.poll(PATIENCE):
                 raise TimeoutError
@@ -90,36 +90,29 @@ class Contender:
         except EOFError:
             self.note = "crashes"
         else:
-            self.seconds += seconds
-            self.turns.append((poses, status, 1e6 * seconds / (stop - start)))
+            self.turns.append((poses, status, 1e6 * seconds / self._draws))
 
     def finish(self) -> Answers:
-        """Stop the process and return all answers."""
+        """Stop the process and return its answers."""
         self._process.kill()
-        poses, status, costs = zip(*self.turns, strict=True) if self.turns else ([], [], [])
-        return Answers(np.concatenate(poses), np.concatenate(status), list(costs), self.note)
+        return Answers(*self.turns[0][:2], [cost for *_, cost in self.turns], self.note)
 
 
 def _serve(pipe: Connection, assembly: tc.Assembly, solver: str) -> None:
     program = tc.build(assembly, solver=solver, method=tc.Method())
     while True:
-        start, stop = pipe.recv()
+        samples = pipe.recv()
         begun = time.process_time()
-        poses, status = _resolved(program, start, stop)
-        pipe.send((poses, status, time.process_time() - begun))
-
-
-def _resolved(program: Program, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
-    (block,) = simulate_blocks(program, samples=stop, start=start, seed=1, threads=1, block=stop - start)
-    return block.poses[:, CORRECTED], block.status
+        (block,) = simulate_blocks(program, samples=samples, seed=1, threads=1, block=samples)
+        pipe.send((block.poses[:, CORRECTED], block.status, time.process_time() - begun))
 
 
 def answers(assembly: tc.Assembly, solvers: list[str], arguments: argparse.Namespace) -> dict[str, Answers]:
     """Return the answers of all solvers that gave any."""
-    contenders = {solver: Contender(assembly, solver) for solver in solvers}
-    for turn in range(arguments.turns):
+    contenders = {solver: Contender(assembly, solver, arguments.draws, arguments.seconds) for solver in solvers}
+    for _ in range(arguments.turns):
         for contender in contenders.values():
-            contender.take(turn * arguments.draws, (turn + 1) * arguments.draws, arguments.seconds)
+            contender.take()
     return {solver: contender.finish() for solver, contender in contenders.items() if contender.turns}
 
 
@@ -199,8 +192,8 @@ def _common_status(found: dict[str, Answers]) -> np.ndarray:
 def draw_figure(results: dict[str, Any], path: Path) -> None:
     """Draw the largest and median differences, statuses and costs of all solvers, a row of each model."""
     solvers = list(dict.fromkeys(solver for found, *_ in results.values() for solver in found))
-    fig, axes = plt.subplots(len(results), 3, figsize=(9, 1.75 * len(results)), layout="constrained", sharey=True, squeeze=False,
-                             sharex="col")  # fmt: skip
+    size = 9, 1.75 * len(results)
+    fig, axes = plt.subplots(len(results), 3, figsize=size, layout="constrained", sharey=True, sharex="col", squeeze=False)
     for (name, (found, apart, ratios, _)), (pose_axis, status_axis, cost_axis) in zip(results.items(), axes, strict=True):
         for place, solver in enumerate(solvers):
             if solver not in found:
@@ -238,7 +231,7 @@ def main() -> None:
     parser.add_argument("--models", nargs="+", choices=MODELS, default=[*MODELS])
     parser.add_argument("--turns", type=int, default=3)
     parser.add_argument("--draws", type=int, default=500, help="of a turn")
-    parser.add_argument("--seconds", type=float, default=60.0, help="CPU time after which a solver takes no further turn")
+    parser.add_argument("--seconds", type=float, default=20.0, help="CPU time of a turn: slow solvers answer fewer draws")
     parser.add_argument("--references", type=int, default=20, help="draws whose reference is compared with a search")
     parser.add_argument("--to", type=Path, default=HERE, help="folder of the figure and of the page")
     arguments = parser.parse_args()

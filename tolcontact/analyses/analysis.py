@@ -147,7 +147,7 @@ class Analysis:
         return dataset
 
     def _dataset(self, answer: Answer) -> xr.Dataset:
-        values, labels, attributes, units = answer.values, answer.labels, answer.attributes, answer.units
+        values, labels, attributes, units = answer.values, answer.labels, dict(answer.attributes), answer.units
         stated = [*self.record.variables, *(v for v in self.record.of_stations if v.name in values)]
         arrays = {v.name: v.entry(np.array(values[v.name])) for v in stated}
         title = {"title": self.record.title.format(assembly=self.assembly, **attributes)}

@@ -202,8 +202,8 @@ def _answer(analysis: Analysis, effort: Effort, values: dict[str, np.ndarray], c
     cases = [f"{end} {measure.name}" for measure in program.nominal.measures for end in terms.ENDS]
     labels = [contributor.label for contributor in program.draws.contributors if contributor.source == FORM]
     formed = dict.fromkeys(label.rpartition(".")[0] for label in labels)
-    attributes = {"random_combinations": analysis.samples, "searches": effort.searches}
-    attributes |= {terms.WITHOUT_FORM: ", ".join(formed)} if formed else {}
+    without = {terms.WITHOUT_FORM: ", ".join(formed)} if formed else {}
+    attributes = {"random_combinations": analysis.samples, "searches": effort.searches, **without}
     return Answer(values, {terms.CASE: cases}, attributes, coarse)
 
 

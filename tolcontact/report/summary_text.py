@@ -208,7 +208,9 @@ def contact_lines(summary: xr.Dataset, count: int, *, is_long: bool = False) -> 
     by_status = _by_status(summary)
     yield "status: " + ", ".join(f"{n} {meaning}" for meaning, n in by_status.items() if n)
     conflicts = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
-    if conflicts:
+    if conflicts and is_long:
+        yield f"not assemblable, so out of specification, and left out of other statistics: {', '.join(conflicts)}"
+    elif conflicts:
         share = percent(summary["not_assemblable"].values)
         yield f"not assemblable: {share}; these count as out of specification, and other statistics with contact leave them out"
         yield f"pairs in conflict there: {', '.join(conflicts)}"
@@ -267,11 +269,14 @@ def _clashes(summary: xr.Dataset, count: int, *, is_long: bool = False) -> Itera
         yield f"bodies were not tested for interference {reason}: certificates hold for contact points"
         return
     if share[0] > 0:
-        yield f"parts without declared contact lie in each other: {percent(share)} of realizations; verdicts do not hold there"
         clashes = _clashes_of(summary, is_declared=False)
-        if is_long and len(clashes) > MOST_CLASHES:
-            clashes[MOST_CLASHES:] = [f"{len(clashes) - MOST_CLASHES} more"]
-        yield f"these parts, where they lie deepest: {', '.join(clashes)}"
+        if is_long:  # the verdicts state the share
+            rest = [f"{len(clashes) - MOST_CLASHES} more"] if len(clashes) > MOST_CLASHES else []
+            yield f"parts without declared contact lie in each other: {', '.join(clashes[:MOST_CLASHES] + rest)}"
+        else:
+            text = f"{percent(share)} of realizations; verdicts do not hold there"
+            yield f"parts without declared contact lie in each other: {text}"
+            yield f"these parts, where they lie deepest: {', '.join(clashes)}"
         yield "advice: declare their contact, or that it is meant: assembly.may_overlap(...); tolcontact check writes the lines"
     if is_long:
         return
