@@ -103,7 +103,7 @@ def test_a_complete_answer_replaces_a_coarse_one_in_an_archive_and_is_not_replac
     tc.analyses.sensitivities(path, **options)
     whole = xr.load_dataset(path, group="statistics/sensitivities")
     assert "coarse" not in whole.attrs and np.isfinite(whole["sensitivity"]).all()
-    with pytest.raises(tc.ArchiveError, match="already has statistics/sensitivities"):
+    with pytest.raises(tc.errors.ArchiveError, match="already has statistics/sensitivities"):
         tc.analyses.sensitivities(path, **options)
 
 

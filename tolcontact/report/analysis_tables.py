@@ -55,7 +55,8 @@ def brief_lines(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Iterator[s
     """Yield a coarse answer in brief: what it rests on, and the first rows of its first tables."""
     report = analysis_report(record, dataset)
     yield f"{report.name.lower()} {dataset.attrs[terms.COARSE]}"
-    for table in [table for table in report.tables if len(table.columns) > report.main][:BRIEF_TABLES]:
+    tables = [table for table in report.tables if len(table.columns) > report.main and (table.title or len(report.tables) == 1)]
+    for table in tables[:BRIEF_TABLES]:
         rows = [[cell for cell in (row[0], row[report.main], *row[1:]) if cell != "-"][:2] for row in table.rows[:BRIEF_ROWS]]
         yield f"  {table.title}: " * bool(table.title) + "; ".join(map(" ".join, rows))
 
