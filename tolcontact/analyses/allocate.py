@@ -73,8 +73,8 @@ def allocate(
     within a trust region (a sequential separable approximation; Svanberg, 1987). A step fails if more realizations are then
     not assemblable than may be outside. Choices come from a linear program with binary unknowns on such functions. If a fresh
     run does not keep a requirement, the margin of the search grows. `progress` is called with numbers of realizations. Raises
-    OptionError if no range varies. By default there are 8192 `samples`; `model`, `seed`, `solver`, `method`, `into` and
-    `client` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
+    OptionError if no range varies. By default there are 8192 `samples`; `model`, `seed`, `solver`, `method`, `into`,
+    `client` and `minutes` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
     """
     analysis = Analysis(
         terms.ALLOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,

@@ -41,7 +41,10 @@ class Answer(NamedTuple):
 
 
 class Stopped(KeyboardInterrupt):
-    """The user stopped an analysis that already had an answer: `dataset`."""
+    """The user stopped an analysis that already had an answer, its `dataset`.
+
+    `try: tc.analyses.tails("model.py")`, then `except tc.analyses.Stopped as stop: print(stop.dataset.probability)`
+    """
 
     def __init__(self, dataset: xr.Dataset) -> None:
         super().__init__(dataset.attrs[terms.COARSE])

@@ -158,8 +158,8 @@ def contributions(
     most 1 % of the variance of any measure; they are estimated as one group (see tolcontact.analyses.contributions).
     `samples` is the number of base realizations: samples (2 + groups) are simulated, and samples (1 + units) more for Shapley
     effects, in addition to the screening. The default follows from 60 000 realizations in total, and is between 512 and 4096.
-    `progress` is called with the number of finished realizations and the total. `model`, `seed`, `solver`, `method`, `into` and
-    `client` are as in all analyses (see tolcontact.analyses): `tc.analyses.contributions("model.nc", by="feature")`.
+    `progress` is called with the number of finished realizations and the total. `model`, `seed`, `solver`, `method`, `into`,
+    `client` and `minutes` are as in all analyses: `tc.analyses.contributions("model.nc", by="feature")`.
     """
     analysis = Analysis(
         terms.CONTRIBUTIONS, model, samples=MIN_SAMPLES if samples is None else samples, seed=seed, solver=solver,

@@ -47,8 +47,8 @@ def sensitivities(
     (or a hundredth of the largest derivative), the central difference is the derivative to second order. Elsewhere it is a mean
     of both sides and of a jump between them. The linearized resolution may cause jumps, and so may points that enter the
     objective "active points". (2 contributors + 1) `samples` are simulated, with 1000 samples by default. `progress` is called
-    with the number of finished realizations and the total. `model`, `seed`, `solver`, `method`, `into` and `client` are as in
-    all analyses: `tc.analyses.sensitivities("model.py", samples=500)`.
+    with the number of finished realizations and the total. `model`, `seed`, `solver`, `method`, `into`, `client` and `minutes`
+    are as in all analyses: `tc.analyses.sensitivities("model.py", samples=500)`.
     """
     analysis = Analysis(
         terms.SENSITIVITIES, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,

@@ -50,7 +50,7 @@ def tails(
     measure that is not a number in any realization has the probability NaN, as in `run`. Probabilities include unresolved
     realizations, with their last poses.
     `progress` is called with the number of realizations simulated, and the approximate total.
-    `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
+    `model`, `samples`, `seed`, `solver`, `method`, `into`, `client` and `minutes` are as in all analyses (see tolcontact.analyses).
     Raises OptionError for a model that has no rare event.
 
     `tc.analyses.tails("model.nc")`

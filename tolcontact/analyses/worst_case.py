@@ -126,7 +126,7 @@ def worst_case(
     zones of forms, and the attribute `without_form` names these features. The linear estimate is exact to first order in the
     deviations: large tilts may exceed it. Only certified realizations count. `progress` is called with the number of
     realizations simulated, and the approximate total.
-    `model`, `samples` (512 by default), `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see
+    `model`, `samples` (512 by default), `seed`, `solver`, `method`, `into`, `client` and `minutes` are as in all analyses (see
     tolcontact.analyses).
 
     `tc.analyses.worst_case("model.py", solver="daqp")`

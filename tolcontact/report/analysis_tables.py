@@ -21,7 +21,6 @@ SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are o
 AT_END = 1.001  # times the smallest factor of a tolerance: below this, it is as small as permitted
 MAX_HOLDERS = 3  # of a part, in a table
 FEW_NAMES = 3  # of features in a note
-BRIEF_TABLES, BRIEF_ROWS = 10, 4  # of a report in brief: its first tables, and the rows of each that a line has
 FEW_SEARCHES = 0.25  # of all: if no more than this share end at a value, a remark states that there may be worse ones
 
 
@@ -49,16 +48,6 @@ def analysis_report(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Analys
         notes = [f"COARSE, {coarse}. More time or realizations give the complete answer.", *report.notes]
         report = replace(report, notes=notes)
     return report
-
-
-def brief_lines(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Iterator[str]:
-    """Yield a coarse answer in brief: what it rests on, and the first rows of its first tables."""
-    report = analysis_report(record, dataset)
-    yield f"{report.name.lower()} {dataset.attrs[terms.COARSE]}"
-    tables = [table for table in report.tables if len(table.columns) > report.main and (table.title or len(report.tables) == 1)]
-    for table in tables[:BRIEF_TABLES]:
-        rows = [[cell for cell in (row[0], row[report.main], *row[1:]) if cell != "-"][:2] for row in table.rows[:BRIEF_ROWS]]
-        yield f"  {table.title}: " * bool(table.title) + "; ".join(map(" ".join, rows))
 
 
 def analysis_text(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Group:
