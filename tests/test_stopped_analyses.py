@@ -66,10 +66,10 @@ def test_stopped_contributions_are_those_of_fewer_realizations():
 
 
 def test_stopped_tails_are_counted():
-    found = stopped(tc.analyses.tails, block(), after=1000)
+    found = stopped(tc.analyses.tails, block(), after=1500)
     _, lower, upper = found.probability.values[0]
-    assert lower < stats.norm.sf(LIMIT) < upper < 2 * lower and "counted among 1000 realizations" in found.attrs["coarse"]
-    assert int(found.simulated[0]) == 1000
+    assert lower < stats.norm.sf(LIMIT) < upper < 2 * lower and "counted among 1500 realizations" in found.attrs["coarse"]
+    assert int(found.simulated[0]) == 1500
 
 
 def test_a_stopped_worst_case_is_the_worst_so_far_and_lies_within_the_bound():

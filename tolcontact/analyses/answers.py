@@ -102,12 +102,13 @@ class Answers:
         return self._dataset_of(answer).assign_attrs({terms.COARSE: f"{reason}: {answer.coarse}"})
 
 
-def stages(samples: int, size: int) -> Iterator[tuple[int, int]]:
+def stages(samples: int, size: int, *, first: int = 0) -> Iterator[tuple[int, int]]:
     """Yield first and last numbers of the base realizations of stages, each with as many as all before.
 
     size   realizations of each base realization
+    first  base realizations of the first stage, if not the default
     """
-    start, stop = 0, min(max(MIN_STAGE // size, MIN_BASE), samples)
+    start, stop = 0, min(first or max(MIN_STAGE // size, MIN_BASE), samples)
     while start < samples:
         yield start, stop
         start, stop = stop, min(2 * stop, samples)

@@ -59,4 +59,5 @@ def brief_lines(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Iterator[s
     tables = [table for table in report.tables if len(table.columns) > report.main and (table.title or len(report.tables) == 1)]
     for table in tables[:BRIEF_TABLES]:
         rows = [[cell for cell in (row[0], row[report.main], *row[1:]) if cell != "-"][:2] for row in table.rows[:BRIEF_ROWS]]
-        yield f"  {table.title}: " * bool(table.title) + "; ".join(map(" ".join, rows))
+        known = "; ".join(" ".join(row) for row in rows if len(row) > 1)
+        yield f"  {table.title}: " * bool(table.title) + (known or "not known yet")
