@@ -9,6 +9,7 @@ no code with the simulation (studies.certificates.optima).
 
 import argparse
 import multiprocessing
+import os
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
@@ -40,7 +41,7 @@ MODELS: dict[str, tuple[str, Callable[[], tc.Assembly]]] = {
 }  # fmt: skip
 BOXES = "ra1", "tower"  # models of convex bodies that stand on each other
 WARM_UP, WARM_DRAWS = 3, 20  # turns that are not timed, and their draws: functions are loaded and compiled
-PATIENCE = 600.0  # s of a turn, after which a solver is stopped
+PATIENCE, WAITING = 40.0, 600.0  # s of CPU time of a turn, and of waiting, after which a solver is stopped
 APART = 1e-6  # mm: statuses are equal, but poses further apart than this differ
 COLOURS = {"resolved": "C2", "untouched": "C8", "not_assemblable": "C1", "doubtful": "C4", "not_converged": "C3"}
 
@@ -81,9 +82,11 @@ class Contender:
         if self.note:
             return
         self._pipe.send(self._draws)
+        begun, sent = self._cpu_time(), time.monotonic()
         try:
-            if not self._pipe.poll(PATIENCE):
-                raise TimeoutError
+            while not self._pipe.poll(1.0):
+                if self._cpu_time() - begun > PATIENCE or time.monotonic() - sent > WAITING:
+                    raise TimeoutError
             poses, status, seconds = self._pipe.recv()
         except TimeoutError:
             self.note = "does not return"
@@ -92,10 +95,16 @@ class Contender:
         else:
             self.turns.append((poses, status, 1e6 * seconds / self._draws))
 
+    def _cpu_time(self) -> float:
+        """Return the CPU time of the process [s], on Linux."""
+        fields = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
     def finish(self) -> Answers:
         """Stop the process and return its answers."""
         self._process.kill()
-        return Answers(*self.turns[0][:2], [cost for *_, cost in self.turns], self.note)
+        poses, status = self.turns[0][:2] if self.turns else (np.zeros((0, 0, 12)), np.zeros(0, dtype=int))
+        return Answers(poses, status, [cost for *_, cost in self.turns], self.note)
 
 
 def _serve(pipe: Connection, assembly: tc.Assembly, solver: str) -> None:
@@ -113,7 +122,10 @@ def answers(assembly: tc.Assembly, solvers: list[str], arguments: argparse.Names
     for _ in range(arguments.turns):
         for contender in contenders.values():
             contender.take()
-    return {solver: contender.finish() for solver, contender in contenders.items() if contender.turns}
+    answered = {solver: contender.finish() for solver, contender in contenders.items()}
+    for solver in [solver for solver, answer in answered.items() if not answer.costs]:
+        print(f"{assembly.name}: {solver} {answered.pop(solver).note}")
+    return answered
 
 
 def reference(found: dict[str, Answers]) -> np.ndarray:
@@ -247,9 +259,8 @@ def main() -> None:
         ratios = {solver: float(np.median(cost)) for solver, cost in costs.items()}
         ways = searched(program, medians, _common_status(found), arguments.references) if key in BOXES else None
         results[name] = found, differences(program, found, medians), ratios, ways
-        print(name, ratios, {solver: answer.note for solver, answer in found.items() if answer.note}, flush=True)
-    draw_figure(results, arguments.to / "draws.png")
-    write(__file__, tables(results), arguments.to)
+        draw_figure(results, arguments.to / "draws.png")
+        write(__file__, tables(results), arguments.to)
 
 
 if __name__ == "__main__":

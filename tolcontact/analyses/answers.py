@@ -18,7 +18,7 @@ from tolcontact.report import brief_lines
 
 LONG = 30_000  # realizations at most: with more to come, answers are shown on the way
 NEXT_LOOK, MIN_LOOK = 2.0, 20.0  # an answer is shown when this many times the time of the previous one has passed; at least [s]
-MIN_STAGE, MIN_BASE = 2000, 4  # realizations of the first stage, and its base realizations
+MIN_STAGE, MIN_BASE = 500, 4  # realizations of the first stage, and its base realizations
 
 log = logging.getLogger(__name__)
 
