@@ -88,7 +88,8 @@ def allocate(
     return analysis.finest(_answers(search, groups, ranges, by))
 
 
-Groups, Answers = Mapping[str, np.ndarray], Iterator[Callable[[], Answer]]
+Groups = Mapping[str, np.ndarray]
+Answers = Iterator[Callable[[], Answer]]
 
 
 def _answers(search: "Search", groups: Groups, ranges: Sequence[float], by: str) -> Answers:

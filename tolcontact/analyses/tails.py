@@ -91,7 +91,7 @@ def _answers(analysis: Analysis, events: "dict[str, list[Callable[[Engine], Any]
         }
         return Answer(values, {terms.EVENT: list(events)}, {"samples": samples}, coarse)
 
-    rng = np.random.default_rng(analysis.seed)
+    rng = np.random.default_rng([analysis.seed, len(events)])
     for start, stop in stages(samples, 1, first=COUNTED):
         if start >= MAX_COUNTED and not any(any(count.are_common) for count in counts):
             break
