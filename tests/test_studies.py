@@ -32,7 +32,6 @@ STUDIES = {
     "certificates/optima.py": ["--first", "6000", "--scenes", "2", "--samples", "3", "--starts", "1"],
     "cost/cluster.py": ["--samples", "20000", "--to", "."],
     "cost/measure.py": ["--scenes", "ra1", "ring", "--sizes", "3", "--seconds", "0.01", "--to", "."],
-    "cost/solvers.py": ["--realizations", "2", "--to", "."],
     "drawings/rules.py": ["--to", "."],
     "drawings/six.py": ["--samples", "40", "--to", "."],
     "elastic/measure.py": ["--realizations", "5", "--rows", "38", "--sheets", "83", "--draws", "1", "--to", "."],
@@ -53,18 +52,28 @@ STUDIES = {
     "robustness/signals.py": ["--tries", "3"],
     "round/measure.py": ["--samples", "100", "--to", "."],
     "site/build.py": ["site", "--samples", "20"],
+    "solvers/draws.py": ["--models", "ra1", "--turns", "1", "--draws", "20", "--references", "2", "--to", "."],
+    "solvers/problems.py": ["--realizations", "2", "--to", "."],
     "verification/intervals.py": ["--repeats", "3", "--sizes", "100"],
     "verification/parts.py": ["--repetitions", "2", "--samples", "200"],
     "verification/rare.py": ["--seeds", "1", "--samples", "30000", "--only", "two ways", "does not fit"],
 }
 UNCOMPARED = (  # times, solvers of other packages, fewer draws
-    *("cluster.py: cluster", "measure.py: cost", "measure.py: set_up", "measure.py: whole", "solvers.py: solvers"),
+    *(
+        "cluster.py: cluster",
+        "measure.py: cost",
+        "measure.py: set_up",
+        "measure.py: whole",
+        "draws.py: draws",
+        "draws.py: search",
+        "problems.py: problems",
+    ),
 )
 EXTRAS = {
     "elastic/measure.py": ["ngsolve"],
     "elastic/set_up.py": ["ngsolve"],
     "benchmarks/others.py": ["openturns", "otaf", "SALib"],
-    "cost/solvers.py": ["qpsolvers"],
+    "solvers/problems.py": ["qpsolvers"],
     "report/picture.py": ["playwright"],
     "site/build.py": ["sphinx", "myst_parser", "furo"],
 }

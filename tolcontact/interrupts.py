@@ -22,6 +22,11 @@ def end(message: str) -> NoReturn:
     os._exit(128 + (_received[0] if _received else signal.SIGINT))
 
 
+def is_stopping() -> bool:
+    """Return whether a signal to stop has been received."""
+    return bool(_received)
+
+
 @contextlib.contextmanager
 def stoppable(*, at_once: bool = False) -> Iterator[None]:
     """Let signals end the block with KeyboardInterrupt, whatever a library makes of it; with `at_once`, end the process."""

@@ -1,7 +1,7 @@
 """Tolerance ranges of least cost for requirements on measures, with contact, and the tolerance to tighten first."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress, owners
+from tolcontact.analyses.answers import Answer
 from tolcontact.analyses.costs import MAX_FACTOR, MIN_FACTOR, Cost, Curves, cheapest, cost_of, curves_of
 from tolcontact.analyses.scaled_trials import (
     MIN_DECISIVE,
@@ -21,6 +22,7 @@ from tolcontact.analyses.scaled_trials import (
     Trial,
     effect_samples,
     narrowing_effects,
+    requirements_of,
 )
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
@@ -34,6 +36,7 @@ COMMON_FACTORS = np.geomspace(MIN_FACTOR, MAX_FACTOR, 13)  # of all ranges, wher
 PENALTY = 10.0  # for missed margins, as a multiple of the cost that these margins save to first order
 MIN_GAIN, LAST_GAIN = 1e-4, 1e-3  # of the cost: smallest gain of an accepted step; smallest gain that leads to another step
 MAX_CHOICES = 8  # binary programs of one search
+COARSE, PRESENT = "figures of a search that has not ended, in its own realizations", "figures of present tolerances"
 VERIFICATIONS, AIM_GAIN = 6, 1.2  # fresh runs; the share of a missing margin that the next search aims for
 
 
@@ -41,6 +44,7 @@ def allocate(
     model: Model | Program, require: str | Sequence[str], *, costs: Mapping[str, Cost] | None = None,
     by: terms.GroupedBy = "contributor", samples: int = 8192, seed: int = 1, solver: Solver | None = None,
     method: Choice | None = None, into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
+    minutes: float | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return tolerance ranges of least cost that meet requirements on measures, with contact resolved.
 
@@ -69,44 +73,59 @@ def allocate(
     within a trust region (a sequential separable approximation; Svanberg, 1987). A step fails if more realizations are then
     not assemblable than may be outside. Choices come from a linear program with binary unknowns on such functions. If a fresh
     run does not keep a requirement, the margin of the search grows. `progress` is called with numbers of realizations. Raises
-    OptionError if no range varies. By default there are 8192 `samples`; `model`, `seed`, `solver`, `method`, `into` and
-    `client` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
+    OptionError if no range varies. By default there are 8192 `samples`; `model`, `seed`, `solver`, `method`, `into`,
+    `client` and `minutes` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
     """
     analysis = Analysis(
         terms.ALLOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
-        progress=progress,
+        progress=progress, minutes=minutes,
     )  # fmt: skip
-    requirements = _requirements(require, program := analysis.program, samples)
+    requirements = requirements_of(require, program := analysis.program, samples)
     curves = curves_of(costs, groups := _groups(program, by), ranges := _ranges(program, groups), program)
     trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), requirements, seed, samples)
     prices = Curves(curves.get(name, 0.0) for name in groups)
     search = Search(trials, prices, np.array([name in curves for name in groups]))
-    fresh, estimates, is_met = _allocated(search, _expected(samples, 0))
-    factors = np.exp(np.stack([np.zeros(len(groups)), fresh.logs], axis=1))
-    values = {
-        "range": np.array(ranges)[:, None] * factors,
-        "factor": factors[:, 1],
-        "cost": [[cost_of(curve, factor) for factor in row] for curve, row in zip(prices, factors, strict=True)],
-        "kept": np.array(estimates).swapaxes(0, 1),
-        "met": np.array(is_met, dtype=np.int8),
-        "required": [requirement.value for requirement in requirements],
-        "idle": search.idle.astype(np.int8),
-        "effect": narrowing_effects(trials),
-    }
-    labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR, "choices": prices.names(fresh.logs, list(groups))}
-    counts: dict[str, Any] = {"samples": samples, "fresh": VERIFICATION_FACTOR * samples, "idle_tried": search.tested_rows}
-    return analysis.dataset(values, labels, by=by, **counts, **limits)
+    return analysis.finest(_answers(search, groups, ranges, by))
 
 
-def _requirements(require: str | Sequence[str], program: Program, samples: int) -> list[Requirement]:
-    """Return the requirements that texts state. Raises OptionError if there are none, or for too few samples."""
-    requirements = [Requirement.parse(text, program) for text in ([require] if isinstance(require, str) else require)]
-    if not requirements:
-        raise OptionError('require is empty; expected a text such as "corner height: ppm 1000"')
-    for requirement in requirements:
-        requirement.check(samples)
-    return requirements
+Groups = Mapping[str, np.ndarray]
+Answers = Iterator[Callable[[], Answer]]
+
+
+def _answers(search: "Search", groups: Groups, ranges: Sequence[float], by: str) -> Answers:
+    """Yield present ranges, those of the search as they change, and the allocated ones."""
+    trials, requirements = search.trials, search.trials.requirements
+    samples, count = trials.samples, len(trials.engine.program.nominal.measures)
+    unknown = np.full((count, len(terms.EFFECTS), len(groups), len(terms.ESTIMATE)), np.nan)
+
+    def answer(trial: Trial, before: list[Estimate], fresh: int, effect: np.ndarray = unknown) -> Answer:
+        factors = np.exp(np.stack([np.zeros(len(groups)), trial.logs], axis=1))
+        values = {
+            "range": np.array(ranges)[:, None] * factors,
+            "factor": factors[:, 1],
+            "cost": [[cost_of(curve, factor) for factor in row] for curve, row in zip(search.curves, factors, strict=True)],
+            "kept": np.array([before, _estimates(requirements, trial)]).swapaxes(0, 1),
+            "met": (_sure_margins(requirements, trial.corrected) >= 0).astype(np.int8),
+            "required": [requirement.value for requirement in requirements],
+            "idle": search.idle.astype(np.int8) if search.tested_rows else np.zeros(len(groups), dtype=np.int8),
+            "effect": effect,
+        }
+        labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
+        attributes = {
+            "by": by, "samples": samples, "fresh": fresh, "idle_tried": search.tested_rows, "floor": MIN_FACTOR,
+            "ceiling": MAX_FACTOR, "choices": search.curves.names(trial.logs, list(groups)),
+        }  # fmt: skip
+        return Answer(values, labels, attributes, COARSE if trial.logs.any() else PRESENT)
+
+    nothing = np.zeros(len(search.priced))
+    search.latest = trials.trial(search.curves.narrowed(nothing))
+    present = _estimates(requirements, search.latest if not search.latest.logs.any() else trials.trial(nothing))
+    yield lambda: answer(search.latest, present, samples)
+    before = _estimates(requirements, trials.trial(nothing, verification=1))
+    yield lambda: answer(search.latest, before, samples)
+    fresh = _allocated(search, _expected(samples, 0))
+    effects = narrowing_effects(trials)
+    yield lambda: answer(fresh, before, VERIFICATION_FACTOR * samples, effects)
 
 
 def _groups(program: Program, by: str) -> dict[str, np.ndarray]:
@@ -134,28 +153,22 @@ def _expected(samples: int, groups: int) -> int:
     return (VERIFICATION_FACTOR + USUAL_STEPS) * samples + groups * of_groups
 
 
-def _allocated(search: "Search", expected: int) -> tuple[Trial, list[list[Estimate]], np.ndarray]:
-    """Return a fresh run with the allocated ranges, and estimates of the requirements in fresh runs, before and after.
-
-    The last result states whether each requirement is met after (requirement,).
-    """
-    trials, requirements, nothing = search.trials, search.trials.requirements, np.zeros(len(search.priced))
-    before = _estimates(requirements, trials.trial(nothing, verification=1))
-    aims, searched = np.zeros(len(requirements)), trials.trial(search.curves.narrowed(nothing))
+def _allocated(search: "Search", expected: int) -> Trial:
+    """Return a fresh run with the allocated ranges, for a search from its latest trial."""
+    trials, requirements = search.trials, search.trials.requirements
+    aims, searched = np.zeros(len(requirements)), search.latest
     search.release(searched)
     for number in range(VERIFICATIONS):
         searched = search.least_cost(searched, aims)
         fresh = trials.trial(searched.logs, verification=2 + number)
         missing = -_sure_margins(requirements, fresh.corrected)
         if (missing <= 0).all():
-            break
+            return fresh
         aims += AIM_GAIN * np.where(np.isfinite(missing), np.maximum(missing, 0.0), 0.0)
         trials.engine.total += expected
-    else:
-        searched = search.least_missing(searched)
-        search.release(searched)
-        fresh = trials.trial(searched.logs, verification=2 + VERIFICATIONS)
-    return fresh, [before, _estimates(requirements, fresh)], _sure_margins(requirements, fresh.corrected) >= 0
+    searched = search.least_missing(searched)
+    search.release(searched)
+    return trials.trial(searched.logs, verification=2 + VERIFICATIONS)
 
 
 def _estimates(requirements: Sequence[Requirement], trial: Trial) -> list[Estimate]:
@@ -181,6 +194,7 @@ class Search:
     trials: ScaledTrials
     curves: Curves
     priced: np.ndarray
+    latest: Trial = field(init=False)  # the best trial so far
     chosen: bool = field(init=False, default=False)  # whether groups with a table keep their choices
     idle: np.ndarray = field(init=False)  # (group,) whether a group has no known influence on any requirement
     tested_rows: int = field(init=False, default=0)  # number of realizations in the latest test of that
@@ -267,6 +281,7 @@ class Search:
             gain = merit - self._merit(logs, candidate_margins, penalty)
             if gain > MIN_GAIN * abs(merit):
                 trial, margins, slopes = candidate, candidate_margins, None
+                self.latest = trial
                 radius = min(2 * radius, FIRST_RADIUS)
                 if gain < LAST_GAIN * abs(merit):
                     break

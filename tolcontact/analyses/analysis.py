@@ -1,6 +1,6 @@
 """The base of all analyses: checks, the engine that simulates, groups of contributors, the dataset and its storage."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.analyses.answers import Answer, Answers, Stopped
 from tolcontact.analyses.designs import Design
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
@@ -40,12 +41,15 @@ class Engine:
     total     number of realizations that `progress` refers to; an analysis may revise it
     """
 
-    def __init__(self, program: Program, blocks: MapBlocks, *, progress: Progress | None = None, total: int = 0) -> None:
+    def __init__(
+        self, program: Program, blocks: MapBlocks, *, progress: Progress | None = None, total: int = 0,
+        answers: Answers | None = None,
+    ) -> None:  # fmt: skip
         self.program = program
         bodies = max((len(group.group.free) for group in program.groups), default=0)
         self._rows = min(block_rows(program), max(MAX_ROWS_OF_BODIES // max(bodies, 1), MIN_BLOCKS))
         self.statuses = np.zeros(len(terms.STATUS_MEANINGS), dtype=int)
-        self._blocks, self._progress, self.total = blocks, progress, total
+        self._blocks, self._progress, self.total, self._answers = blocks, progress, total, answers
 
     @property
     def simulated(self) -> int:
@@ -73,6 +77,8 @@ class Engine:
             self.statuses += np.bincount(arrays[-1], minlength=len(self.statuses))
             if self._progress:
                 self._progress(min(self.simulated, self.total), self.total)
+            if self._answers:
+                self._answers.check(self.total)
         return tuple(np.concatenate(column) for column in zip(*observed, strict=True))
 
     def simulate_deviations(self, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -101,8 +107,9 @@ class Analysis:
     def __init__(
         self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int | None = None, seed: int = 1,
         solver: Solver | None = None, method: Choice | None = None, into: str | Path | None = None, client: Any = None,
-        progress: Progress | None = None,
+        progress: Progress | None = None, minutes: float | None = None,
     ) -> None:  # fmt: skip
+        self._answers = Answers(record, self._dataset, minutes)
         if samples is not None:
             check_counts(samples=samples, seed=seed)
         self.record, self.program, self._into = record, program_of(model, solver, method), into
@@ -119,13 +126,28 @@ class Analysis:
     def dataset(
         self, values: Mapping[str, Any], labels: Mapping[str, Sequence[str]], *, units: str | None = None, **attributes: Any
     ) -> xr.Dataset:
-        """Return the dataset of the analysis, and add it to the archive if there is one.
+        """Return the dataset of an Answer (see there), and add it to the archive if there is one."""
+        return self._kept(self._dataset(Answer(values, labels, attributes, units=units)))
 
-        values      array for each variable of the record
-        labels      labels of dimensions that are neither in the vocabulary nor in the model
-        units       units of the only measure, where no dimension lists measures
-        attributes  in addition to the title and the settings
+    def finest(self, answers: Iterable[Callable[[], Answer]]) -> xr.Dataset:
+        """Return the dataset of the last of some answers, which are more and more accurate, and add it to the archive.
+
+        Answers are functions, since most of them are never asked for. When the time of the analysis ends, the dataset is that
+        of the latest answer. Raises Stopped, with this dataset, when the user stops the analysis.
         """
+        try:
+            return self._kept(self._answers.last(answers))
+        except Stopped as stop:
+            self._kept(stop.dataset)
+            raise
+
+    def _kept(self, dataset: xr.Dataset) -> xr.Dataset:
+        if self._into is not None:
+            keep(self._into, self.record, dataset, self.program)
+        return dataset
+
+    def _dataset(self, answer: Answer) -> xr.Dataset:
+        values, labels, attributes, units = answer.values, answer.labels, dict(answer.attributes), answer.units
         stated = [*self.record.variables, *(v for v in self.record.of_stations if v.name in values)]
         arrays = {v.name: v.entry(np.array(values[v.name])) for v in stated}
         title = {"title": self.record.title.format(assembly=self.assembly, **attributes)}
@@ -134,14 +156,11 @@ class Analysis:
             "seed": self.seed, "solver": self.program.solver.name, "resolution": method.resolution,
             "objective": method.objective,
         }  # fmt: skip
-        dataset = xr.Dataset(
+        return xr.Dataset(
             arrays,
             coords=self._coordinates(labels) | ({} if units is None else {"measure_units": ((), units)}),
             attrs=title | attributes | (settings if self.samples else {}),
         )
-        if self._into is not None:
-            keep(self._into, self.record, dataset, self.program)
-        return dataset
 
     def _coordinates(self, labels: Mapping[str, Sequence[str]]) -> dict[str, Any]:
         nominal, contributors = self.program.nominal, self.program.draws.contributors
@@ -169,7 +188,8 @@ class Analysis:
         Raises OptionError if that many realizations would take too much time or memory.
         """
         self.check_affordable(self.samples if total is None else total)
-        return Engine(self.program, self.blocks, progress=None if total is None else self.progress, total=total or 0)
+        progress = None if total is None else self.progress
+        return Engine(self.program, self.blocks, progress=progress, total=total or 0, answers=self._answers)
 
     def check_affordable(self, realizations: int) -> None:
         """Raise OptionError if that many realizations would take too much time or memory."""

@@ -5,8 +5,7 @@ The total index of a set of groups is at least the total index of each group in 
 index of all minor groups bounds the first-order and total index of each of them, and costs as much as one group.
 """
 
-import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,6 +16,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis, Engine, Progress, independent_groups, owners
+from tolcontact.analyses.answers import Answer, stages
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
 from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.compilation import Program
@@ -32,10 +32,6 @@ MINOR_SHARE = 0.01  # of the variance of any measure in any state: the largest j
 MIN_EFFECTIVE = 16  # effective base realizations behind the variance of a measure: with fewer, no group is minor
 BUDGET = 60_000  # realizations in total that determine the default number of base realizations
 MIN_SAMPLES, MAX_SAMPLES = 512, 4096  # base realizations by default
-LONG = 30_000  # realizations at most: with more to come, a first look is shown
-MAX_LOOKS, LARGEST = 10, 4  # measures, and shares of each, of a first look
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,29 +84,58 @@ class Screening:
         return Estimate(min(np.nan_to_num(total), upper), 0.0 * together.upper, together.upper)
 
 
-def screened(engine: Engine, groups: Mapping[str, np.ndarray], seed: int) -> Screening:
-    """Return the screening of groups by total indices, with separate realizations. Few groups are all estimated."""
-    if len(groups) < MIN_GROUPS:
-        return Screening.none(groups)
-    design = MixedDraws(engine.program.draws, list(groups.values()))
-    measured, _ = engine.simulate_design(design, SCREENING_SAMPLES, seed=seed, start=START)
-    totals, accuracies = [], engine.program.accuracies
-    for states, accuracy in zip(measured.transpose(3, 2, 0, 1), accuracies, strict=True):
-        totals.append([[index.value for index in sobol_indices(f, accuracy)[1]] for f in states])
-        squares = [((f[:, :2] - f[:, :2].mean()) ** 2).mean(axis=1) for f in states]
-        if any(0 < effective_count(square) < MIN_EFFECTIVE for square in squares):
-            return Screening.none(groups)
-    shares = np.nan_to_num(np.array(totals)).reshape(-1, len(groups))
-    order = np.argsort(shares.max(axis=0, initial=0.0), kind="stable")
-    is_minor = np.zeros(len(groups), dtype=bool)
-    is_minor[order] = (shares[:, order].cumsum(axis=1) <= MINOR_SHARE).all(axis=0)
-    return Screening(groups, is_minor, np.array(totals)) if is_minor.sum() > 1 else Screening.none(groups)
+class ScreeningRun:
+    """A screening of groups by total indices, with separate realizations; few groups are all estimated."""
+
+    def __init__(self, engine: Engine, groups: Mapping[str, np.ndarray], seed: int) -> None:
+        self._engine, self._groups, self._seed = engine, groups, seed
+        self.observed = Observed(MixedDraws(engine.program.draws, list(groups.values())))
+
+    def stages(self) -> Iterator[int]:
+        """Simulate more and more realizations, and yield the numbers of base realizations."""
+        for start, stop in stages(SCREENING_SAMPLES, self.observed.design.size):
+            self.observed.simulate(self._engine, stop - start, seed=self._seed, start=START + start)
+            yield stop
+
+    def screening(self) -> Screening:
+        """Return the screening by all realizations."""
+        groups, (measured, _) = self._groups, self.observed.arrays
+        totals, accuracies = [], self._engine.program.accuracies
+        for states, accuracy in zip(measured.transpose(3, 2, 0, 1), accuracies, strict=True):
+            totals.append([[index.value for index in sobol_indices(f, accuracy)[1]] for f in states])
+            squares = [((f[:, :2] - f[:, :2].mean()) ** 2).mean(axis=1) for f in states]
+            if any(0 < effective_count(square) < MIN_EFFECTIVE for square in squares):
+                return Screening.none(groups)
+        shares = np.nan_to_num(np.array(totals)).reshape(-1, len(groups))
+        order = np.argsort(shares.max(axis=0, initial=0.0), kind="stable")
+        is_minor = np.zeros(len(groups), dtype=bool)
+        is_minor[order] = (shares[:, order].cumsum(axis=1) <= MINOR_SHARE).all(axis=0)
+        return Screening(groups, is_minor, np.array(totals)) if is_minor.sum() > 1 else Screening.none(groups)
+
+
+class Observed:
+    """The measures of a design (base, realization, state, measure), and deviations (base, contributor) of its first members."""
+
+    def __init__(self, design: MixedDraws) -> None:
+        self.design = design
+        self._parts: list[tuple[np.ndarray, ...]] = []
+
+    def simulate(self, engine: Engine, samples: int, *, seed: int, start: int) -> None:
+        """Add `samples` base realizations."""
+        observe = partial(_first_deviations, self.design.size)
+        self._parts.append(engine.simulate_design(self.design, samples, seed=seed, start=start, observe=observe)[:2])
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray]:
+        """Both arrays of all base realizations."""
+        measured, deviations = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        return measured, deviations[:, 0]
 
 
 def contributions(
     model: Model | Program, *, samples: int | None = None, seed: int = 1, solver: Solver | None = None,
     method: Choice | None = None, by: terms.GroupedBy = "contributor", into: str | Path | None = None, client: Any = None,
-    progress: Progress | None = None,
+    progress: Progress | None = None, minutes: float | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return Sobol' indices of each measure (see tolcontact.statistics.sobol_indices), and the classical linear percentages.
 
@@ -133,12 +158,12 @@ def contributions(
     most 1 % of the variance of any measure; they are estimated as one group (see tolcontact.analyses.contributions).
     `samples` is the number of base realizations: samples (2 + groups) are simulated, and samples (1 + units) more for Shapley
     effects, in addition to the screening. The default follows from 60 000 realizations in total, and is between 512 and 4096.
-    `progress` is called with the number of finished realizations and the total. `model`, `seed`, `solver`, `method`, `into` and
-    `client` are as in all analyses (see tolcontact.analyses): `tc.analyses.contributions("model.nc", by="feature")`.
+    `progress` is called with the number of finished realizations and the total. `model`, `seed`, `solver`, `method`, `into`,
+    `client` and `minutes` are as in all analyses: `tc.analyses.contributions("model.nc", by="feature")`.
     """
     analysis = Analysis(
         terms.CONTRIBUTIONS, model, samples=MIN_SAMPLES if samples is None else samples, seed=seed, solver=solver,
-        method=method, into=into, client=client, progress=progress,
+        method=method, into=into, client=client, progress=progress, minutes=minutes,
     )  # fmt: skip
     program = analysis.program
     deviations = program.draws.without_shared_causes(analysis.sampled_deviations())
@@ -146,27 +171,84 @@ def contributions(
     groups, units = (independent_groups(program.draws, names, varies, correlated=correlated) for correlated in (True, False))
     analysis.check_varies(groups)
     released = ReleasedDraws(program.draws, units) if len(units) > len(groups) else None
-    engine = analysis.engine(analysis.samples * _realizations_each(len(groups), released))
     slopes = total_derivatives(program)
     linear = [_linear_shares(program, deviations, row, groups.values()) for row in slopes]
-    for line in first_look(program, list(groups), linear) if engine.total > LONG else ():
-        log.warning(line)
-    screening = screened(engine, groups, seed) if analysis.samples > 2 * SCREENING_SAMPLES else Screening.none(groups)
-    mixed = MixedDraws(program.draws, screening.estimated)
-    realizations_each = _realizations_each(len(screening.estimated), released)
-    if samples is None:
-        samples = int(np.clip((BUDGET - engine.simulated) // realizations_each, MIN_SAMPLES, MAX_SAMPLES))
-    engine.total = engine.simulated + samples * realizations_each
-    measured, A, _ = engine.simulate_design(mixed, samples, seed=seed, observe=partial(_first_deviations, mixed.size))
-    values = {
-        **_indices(screening, measured, program.accuracies),
-        "shapley": _shapley_effects(engine, released, samples, seed),
-        "linear": linear,
-        "missed": _missed(program, measured[:, 0], A[:, 0], slopes),
-        "by_status": engine.statuses,
-    }
     labels = {terms.GROUP: list(groups), terms.UNIT: [] if released is None else list(units)}
-    return analysis.dataset(values, labels, base_realizations=samples, realizations=engine.simulated, by=by)
+    return analysis.finest(Shares(analysis, by, groups, released, slopes, linear, labels).answers(samples))
+
+
+@dataclass(frozen=True, eq=False)
+class Shares:
+    """Answers of `contributions` from more and more realizations.
+
+    groups    columns of deviations by group
+    released  draws for Shapley effects, if any
+    slopes    (measure, contributor), at the nominal assembly
+    linear    shares (group,) of each measure
+    """
+
+    analysis: Analysis
+    by: str
+    groups: Mapping[str, np.ndarray]
+    released: ReleasedDraws | None
+    slopes: np.ndarray
+    linear: Sequence[np.ndarray]
+    labels: Mapping[str, Sequence[str]]
+
+    def answers(self, samples: int | None) -> Iterator[Callable[[], Answer]]:
+        """Yield the linear shares without contact, those of the screening, and those of all realizations."""
+        analysis, released, groups, seed = self.analysis, self.released, self.groups, self.analysis.seed
+        engine = analysis.engine(analysis.samples * _realizations_each(len(groups), released))
+        screening, everything = Screening.none(groups), Screening.none(groups)
+        yield lambda: self._answer(engine, everything, None, 0, "linear shares, without contact")
+        if analysis.samples > 2 * SCREENING_SAMPLES and len(groups) >= MIN_GROUPS:
+            run = ScreeningRun(engine, groups, seed)
+            for count in run.stages():
+                text = f"a screening with {count} base realizations"
+                yield partial(self._answer, engine, everything, run.observed, count, text)
+            screening = run.screening()
+        mixed = MixedDraws(analysis.program.draws, screening.estimated)
+        realizations_each = _realizations_each(len(screening.estimated), released)
+        if samples is None:
+            samples = int(np.clip((BUDGET - engine.simulated) // realizations_each, MIN_SAMPLES, MAX_SAMPLES))
+        engine.total = engine.simulated + samples * realizations_each
+        observed = Observed(mixed)
+        for start, stop in stages(samples, mixed.size):
+            observed.simulate(engine, stop - start, seed=seed, start=start)
+            if stop > SCREENING_SAMPLES or screening is everything or stop == samples:
+                text = f"{stop} of {samples} base realizations"
+                yield partial(self._answer, engine, screening, observed, stop, text)
+        shapley = _shapley_effects(engine, released, samples, seed)
+        yield lambda: self._answer(engine, screening, observed, samples, "", shapley)
+
+    def _answer(
+        self, engine: Engine, screening: Screening, observed: Observed | None, count: int, coarse: str,
+        shapley: np.ndarray | None = None,
+    ) -> Answer:  # fmt: skip
+        """Return the answer from `count` base realizations; without any, it has linear shares only."""
+        program = self.analysis.program
+        if observed is None:
+            values = self._unknown()
+        else:
+            measured, deviations = observed.arrays
+            missed_shares = _missed(program, measured[:, 0], deviations, self.slopes)
+            values = {**_indices(screening, measured, program.accuracies), "missed": missed_shares}
+        if shapley is None:
+            shapley = np.full((*self._shape, len(self.labels[terms.UNIT]), len(terms.ESTIMATE)), np.nan)
+        values |= {"shapley": shapley, "linear": self.linear, "by_status": engine.statuses}
+        attributes = {"base_realizations": count, "realizations": engine.simulated, "by": self.by}
+        return Answer(values, self.labels, attributes, coarse)
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        return len(self.linear), len(terms.STATES)
+
+    def _unknown(self) -> dict[str, Any]:
+        """Return indices that are not known yet."""
+        indices = np.full((*self._shape, len(self.groups), len(terms.ESTIMATE)), np.nan)
+        minor = np.zeros(len(self.groups), dtype=np.int8)
+        of_all = np.full((*self._shape, len(terms.ESTIMATE)), np.nan)
+        return {"first": indices, "total": indices, "minor": minor, "minor_total": of_all, "missed": of_all}
 
 
 def _missed(program: Program, measured: np.ndarray, deviations: np.ndarray, slopes: np.ndarray) -> list[Any]:
@@ -176,16 +258,6 @@ def _missed(program: Program, measured: np.ndarray, deviations: np.ndarray, slop
         [missed(f, own @ row, accuracy) for f in states]
         for states, row, accuracy in zip(measured.transpose(2, 1, 0), slopes, program.accuracies, strict=True)
     ]
-
-
-def first_look(program: Program, groups: Sequence[str], linear: Sequence[np.ndarray]) -> Iterator[str]:
-    """Yield a line for each of the first measures: its largest linear shares (measure, group), which need no simulation."""
-    measures = [measure.name for measure in program.nominal.measures]
-    yield "a first look, linear and without contact, until the shares with contact are known (in % of the variance):"
-    for name, shares in list(zip(measures, linear, strict=True))[:MAX_LOOKS]:
-        order = [k for k in np.argsort(-shares)[:LARGEST] if shares[k] > MINOR_SHARE]
-        found = ", ".join(f"{groups[k]} {100 * shares[k]:.0f}" for k in order)
-        yield f"  {name}: {found or 'no share, or a kink in the nominal assembly'}"
 
 
 def _realizations_each(groups: int, released: ReleasedDraws | None) -> int:

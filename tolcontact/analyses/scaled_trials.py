@@ -140,6 +140,16 @@ class Requirement:
         return by_percentiles(sample, self.limits)[1]
 
 
+def requirements_of(require: str | Sequence[str], program: Program, samples: int) -> list[Requirement]:
+    """Return the requirements that texts state. Raises OptionError if there are none, or for too few samples."""
+    requirements = [Requirement.parse(text, program) for text in ([require] if isinstance(require, str) else require)]
+    if not requirements:
+        raise OptionError('require is empty; expected a text such as "corner height: ppm 1000"')
+    for requirement in requirements:
+        requirement.check(samples)
+    return requirements
+
+
 Hits = tuple[np.ndarray, np.ndarray]  # numbers (row,) of realizations that change, and their corrected measures afterwards
 
 

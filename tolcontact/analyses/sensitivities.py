@@ -1,5 +1,7 @@
 """Derivatives of each measure with respect to each contributor, with contact."""
 
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +10,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis, Progress
+from tolcontact.analyses.answers import Answer, stages
 from tolcontact.analyses.designs import SteppedDraws
 from tolcontact.analyses.linear_model import leverages, total_derivatives
 from tolcontact.compilation import Program
@@ -24,7 +27,7 @@ NEGLIGIBLE = 0.1  # of the largest derivative of a measure: smaller ones may dif
 
 def sensitivities(
     model: Model | Program, *, samples: int = 1000, seed: int = 1, solver: Solver | None = None, method: Choice | None = None,
-    into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
+    into: str | Path | None = None, client: Any = None, progress: Progress | None = None, minutes: float | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return derivatives of each measure by each contributor that varies, from differences in each realization.
 
@@ -44,44 +47,75 @@ def sensitivities(
     (or a hundredth of the largest derivative), the central difference is the derivative to second order. Elsewhere it is a mean
     of both sides and of a jump between them. The linearized resolution may cause jumps, and so may points that enter the
     objective "active points". (2 contributors + 1) `samples` are simulated, with 1000 samples by default. `progress` is called
-    with the number of finished realizations and the total. `model`, `seed`, `solver`, `method`, `into` and `client` are as in
-    all analyses: `tc.analyses.sensitivities("model.py", samples=500)`.
+    with the number of finished realizations and the total. `model`, `seed`, `solver`, `method`, `into`, `client` and `minutes`
+    are as in all analyses: `tc.analyses.sensitivities("model.py", samples=500)`.
     """
     analysis = Analysis(
         terms.SENSITIVITIES, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
-        progress=progress,
+        progress=progress, minutes=minutes,
     )  # fmt: skip
     program = analysis.program
     deviation = program.draws.without_shared_causes(analysis.sampled_deviations()).std(axis=0)
     columns = np.flatnonzero(deviation > 0)
     analysis.check_varies(columns.size)
-    steps = STEP * deviation[columns]
-    stepped = SteppedDraws(program.draws, columns, steps)
+    return analysis.finest(_answers(analysis, columns, STEP * deviation[columns]))
+
+
+def _answers(analysis: Analysis, columns: np.ndarray, steps: np.ndarray) -> Iterator[Callable[[], Answer]]:
+    """Yield answers from more and more realizations; the first one has nominal derivatives only."""
+    stepped, samples = SteppedDraws(analysis.program.draws, columns, steps), analysis.samples
     engine = analysis.engine(samples * stepped.size)
-    measured, carrying, statuses = engine.simulate_design(stepped, samples, seed=seed, observe=_observed)
+    nominal = total_derivatives(analysis.program)[:, columns]
+    observed: list[tuple[np.ndarray, ...]] = []
+
+    def answer(count: int) -> Answer:
+        arrays = [np.concatenate(parts) for parts in zip(*observed, strict=True)]
+        values = _values(analysis.program, steps, nominal, *arrays) if count else _nominal_values(analysis.program, nominal)
+        leverage = leverages(analysis.program)[columns]
+        labels = {terms.CONTRIBUTOR: [analysis.program.nominal.contributors[column] for column in columns]}
+        attributes = {"realizations": count, "simulated": count * stepped.size}
+        coarse = f"{count} of {samples} realizations" if count else "nominal derivatives, without contact"
+        return Answer({"leverage": leverage, "step": steps, **values}, labels, attributes, coarse)
+
+    yield partial(answer, 0)
+    for start, stop in stages(samples, stepped.size):
+        observed.append(engine.simulate_design(stepped, stop - start, start=start, seed=analysis.seed, observe=_observed))
+        yield partial(answer, stop)
+
+
+def _nominal_values(program: Program, nominal: np.ndarray) -> dict[str, Any]:
+    """Return the variables of derivatives with contact, which are not known yet."""
+    shape = *nominal.shape, len(terms.ESTIMATE)
+    unknown = np.full((len(nominal), 2, *shape[1:]), np.nan)
+    counts = np.zeros(len(terms.STATUS_MEANINGS), dtype=int)
+    return {
+        "nominal": nominal, "sensitivity": unknown, "spread": unknown[..., 0], "by_contact": unknown,
+        "changing": unknown[0, 0], "by_status": counts,
+    }  # fmt: skip
+
+
+def _values(
+    program: Program, steps: np.ndarray, nominal: np.ndarray, measured: np.ndarray, carrying: np.ndarray, statuses: np.ndarray
+) -> dict[str, Any]:
+    """Return the variables from measures (n, realization, state, measure) of steps, active points and statuses."""
     status = statuses[:, 0]  # of the realizations before any step
-    up, down = np.split(np.arange(1, stepped.size), 2)
+    up, down = np.split(np.arange(1, measured.shape[1]), 2)
     ahead = (measured[:, up] - measured[:, :1]) / steps[:, None, None]
     behind = (measured[:, :1] - measured[:, down]) / steps[:, None, None]
     slopes = (ahead + behind) / 2
-    nominal = total_derivatives(program)[:, columns]
     carries_otherwise = (carrying[:, up] != carrying[:, :1]).any(axis=2) | (carrying[:, down] != carrying[:, :1]).any(axis=2)
     rounding = program.accuracies / steps[:, None]
     changes = carries_otherwise | _has_kink(ahead, behind, np.nan_to_num(np.abs(nominal)), rounding)
     smooth = np.where(changes[:, :, None], np.nan, slopes[:, :, terms.CORRECTED])
     is_touched = status != terms.Status.UNTOUCHED
-    values = {
+    return {
         "nominal": nominal,
-        "leverage": leverages(program)[columns],
         "sensitivity": np.stack([_means(slopes[:, :, state]) for state in range(len(terms.STATES))], axis=1),
         "spread": slopes.std(axis=0, ddof=1).transpose(2, 1, 0),
         "by_contact": np.stack([_means(smooth[~is_touched]), _means(smooth[is_touched])], axis=1),
         "changing": [intervals.proportion(column) for column in changes.T],
-        "step": steps,
         "by_status": np.bincount(status, minlength=len(terms.STATUS_MEANINGS)),
     }
-    labels = {terms.CONTRIBUTOR: [program.nominal.contributors[column] for column in columns]}
-    return analysis.dataset(values, labels, realizations=samples, simulated=samples * stepped.size)
 
 
 def _observed(block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

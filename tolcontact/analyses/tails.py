@@ -1,6 +1,6 @@
 """Probabilities of rare events: a measure outside its limits, or parts that cannot be assembled."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,16 +11,19 @@ from scipy.special import gammaincc, ndtr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis, Engine, Progress
+from tolcontact.analyses.answers import Answer, stages
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.method import Solver
-from tolcontact.statistics.intervals import UNDEFINED
+from tolcontact.statistics.intervals import UNDEFINED, proportion
 from tolcontact.statistics.rare import NEGLIGIBLE, Tail, either, sufficient_tail
 from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 
 MIN_SAMPLES = 30_000  # for a search: fewer see too few of an event's regions (studies/verification)
+COUNTED, MAX_COUNTED = 1500, 3000  # realizations of the first answer, by counting; and of the last, without a common event
+MIN_SHARE = 1 / 30  # of the first realizations: more common sides of events are only counted
 MIN_AT_STOP = 50  # values at a limit that is never exceeded
 UNDEFINED_TAIL = Tail(UNDEFINED, 1.0)
 
@@ -28,7 +31,7 @@ UNDEFINED_TAIL = Tail(UNDEFINED, 1.0)
 def tails(
     model: Model | Program, *, samples: int | None = None, seed: int = 1, solver: Solver | None = None,
     method: Choice | None = None, into: str | Path | None = None, client: Any = None,
-    progress: Progress | None = None,
+    progress: Progress | None = None, minutes: float | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return probabilities of rare events (see tolcontact.statistics.rare).
 
@@ -36,19 +39,20 @@ def tails(
         disagreement (event)                    ratio of the results of two searches for the event; 1 if they agree
         stop         (event)                    1: many values were at one of the limits, and none beyond; if the other limit
                                                 can be exceeded, this one is left out
-        simulated    (event)                    number of realizations, about `samples` for each limit
+        simulated    (event)                    number of realizations, some of them the same for all events
         by_status    (event, status_meaning)    number of realizations, most of them unlikely ones
 
     In an event a corrected measure is beyond its limits by more than its accuracy, or, in an exact resolution, parts cannot be
-    assembled. The score of the former is the measure, and each limit has its own search; the latter only has a search by
-    inflation of all deviations. Each search has about `samples` realizations, by default and at least 30 000, since fewer miss
-    regions of an event. A quarter of 120 000 or more suffices where the upper bound of the interval is at most 1.5 times the
-    lower one; otherwise the result comes from the other three quarters. A probability of 0 with an upper bound means that the
-    search ended below 1e-9. Where two searches disagree, the interval covers both results, and more realizations are needed. A
-    measure that is not a number in any realization has the probability NaN, as in `run`. Probabilities include unresolved
-    realizations, with their last poses.
-    `progress` is called with the number of realizations simulated, and the approximate total.
-    `model`, `samples`, `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see tolcontact.analyses).
+    assembled. Limits that a thirtieth of the realizations or more exceed are counted in the same `samples` realizations. For
+    others there are searches: the score of a limit is the measure, and each limit has its own search; parts that cannot be
+    assembled only have a search by inflation of all deviations. Each search has about `samples` realizations, by default and
+    at least 30 000, since fewer miss regions of an event. A quarter of 120 000 or more suffices where the upper bound of the
+    interval is at most 1.5 times the lower one; otherwise the result comes from the other three quarters. A probability of 0
+    with an upper bound means that the search ended below 1e-9. Where two searches disagree, the interval covers both results,
+    and more realizations are needed. A measure that is not a number in any realization has the probability NaN, as in `run`.
+    Probabilities include unresolved realizations, with their last poses.
+    `progress` is called with the number of realizations simulated, and the approximate total. `model`, `samples`, `seed`,
+    `solver`, `method`, `into`, `client` and `minutes` are as in all analyses (see tolcontact.analyses).
     Raises OptionError for a model that has no rare event.
 
     `tc.analyses.tails("model.nc")`
@@ -58,31 +62,97 @@ def tails(
         raise OptionError(f"samples is {samples!r}; expected at least {MIN_SAMPLES} realizations for each limit")
     analysis = Analysis(
         terms.TAILS, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
-        progress=progress,
+        progress=progress, minutes=minutes,
     )  # fmt: skip
     program = analysis.program
     analysis.check_varies(program.draws.varying)
-    events = _events(program)
-    engine, dimensions = analysis.engine(sum(map(len, events.values())) * samples), len(program.draws.varying)
-    event_tails, statuses, stops = [], [], []
-    for number, sides in enumerate(events.values()):
-        before, scores, side_tails = engine.statuses.copy(), [make_score(engine) for make_score in sides], []
-        for side, score in enumerate(scores):  # each has its own region, and could hide the region of the other
-            rng = np.random.default_rng([analysis.seed, number, side])
-            side_tails.append(sufficient_tail(score, dimensions, samples=samples, rng=rng, leads=score.leads))
-        # If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
-        exceedable = [tail for score, tail in zip(scores, side_tails, strict=True) if not score.is_stop] or side_tails
-        event_tails.append(UNDEFINED_TAIL if any(score.is_undefined for score in scores) else either(exceedable))
-        stops.append(any(score.is_stop for score in scores))
-        statuses.append(engine.statuses - before)
-    values = {
-        "probability": [tail.probability for tail in event_tails],
-        "disagreement": [tail.disagreement for tail in event_tails],
-        "stop": np.array(stops, dtype=np.int8),
-        "simulated": np.sum(statuses, axis=1),
-        "by_status": statuses,
-    }
-    return analysis.dataset(values, {terms.EVENT: list(events)}, samples=samples)
+    return analysis.finest(_answers(analysis, _events(program)))
+
+
+def _answers(analysis: Analysis, events: "dict[str, list[Callable[[Engine], Any]]]") -> Iterator[Callable[[], Answer]]:
+    """Yield answers by counting in more and more realizations, and then by searches for one event after the other."""
+    samples, dimensions = analysis.samples, len(analysis.program.draws.varying)
+    engine = analysis.engine(sum(map(len, events.values())) * samples)
+    counts = [Count([make_score(engine) for make_score in sides]) for sides in events.values()]
+    statuses, searched = np.zeros_like(engine.statuses), list[tuple[Tail, np.ndarray]]()
+
+    def answer() -> Answer:
+        total = int(statuses.sum())
+        found = [f"{len(searched)} of {len(events)} events are searched for"] if searched else []
+        coarse = "; ".join([*found, f"the {'others' if found else 'events'} are counted among {total} realizations"])
+        tails = [tail for tail, _ in searched] + [count.tail() for count in counts[len(searched) :]]
+        by_status = [statuses + further for _, further in searched] + [statuses] * (len(events) - len(searched))
+        values = {
+            "probability": [tail.probability for tail in tails],
+            "disagreement": [tail.disagreement for tail in tails],
+            "stop": np.array([count.is_stop for count in counts], dtype=np.int8),
+            "simulated": np.sum(by_status, axis=1),
+            "by_status": by_status,
+        }
+        return Answer(values, {terms.EVENT: list(events)}, {"samples": samples}, coarse)
+
+    rng = np.random.default_rng([analysis.seed, len(events)])
+    for start, stop in stages(samples, 1, first=COUNTED):
+        if start >= MAX_COUNTED and not any(any(count.are_common) for count in counts):
+            break
+        u = rng.standard_normal((stop - start, dimensions))
+        measured, status = simulated_scores(engine, u)
+        statuses += np.bincount(status, minlength=len(statuses))
+        for count in counts:
+            count.add(measured, status, u)
+        yield answer
+    engine.total = engine.simulated + samples * sum(not common for count in counts for common in count.are_common)
+    for number, count in enumerate(counts):
+        before = engine.statuses.copy()
+        for side, score in enumerate(count.scores):  # each has its own region, and could hide the region of the other
+            if not count.are_common[side]:
+                rng = np.random.default_rng([analysis.seed, number, side])
+                tail = sufficient_tail(score, dimensions, samples=samples, rng=rng, leads=score.leads)
+                count.searched[side] = tail
+        searched.append((count.tail(), engine.statuses - before))
+        yield answer
+
+
+class Count:
+    """The sides of an event among the same realizations, each with its score; a rare side is `searched` for, too.
+
+    hits  for each side (n,), whether a realization is beyond it
+    """
+
+    def __init__(self, scores: list[Any]) -> None:
+        self.scores, self.hits = scores, [np.zeros(0, dtype=bool) for _ in scores]
+        self.searched: dict[int, Tail] = {}
+
+    def add(self, measured: np.ndarray, status: np.ndarray, u: np.ndarray) -> None:
+        """Add realizations at normal scores u (n, d)."""
+        self.hits = [
+            np.append(hits, score.of(measured, status, u) > 0) for hits, score in zip(self.hits, self.scores, strict=True)
+        ]
+
+    @property
+    def are_common(self) -> list[bool]:
+        """Whether each side has so many hits among the first realizations that a search would not be more accurate.
+
+        They are a twentieth of those that are counted, so this choice changes no estimate by more than a hundredth.
+        """
+        return [bool(hits[:COUNTED].sum() >= MIN_SHARE * min(COUNTED, len(hits))) and len(hits) > 0 for hits in self.hits]
+
+    @property
+    def is_stop(self) -> bool:
+        """Whether one of the sides is a stop."""
+        return any(score.is_stop for score in self.scores)
+
+    def tail(self) -> Tail:
+        """Return the probability of the event: counted, but for the sides that were searched for.
+
+        If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
+        """
+        if any(score.is_undefined for score in self.scores):
+            return UNDEFINED_TAIL
+        exceedable = {side for side, score in enumerate(self.scores) if not score.is_stop} or set(range(len(self.scores)))
+        counted = [self.hits[side] for side in exceedable - set(self.searched)]
+        tails = [tail for side, tail in self.searched.items() if side in exceedable]
+        return either([*tails, *([Tail(proportion(np.any(counted, axis=0)), 1.0)] if counted else [])])
 
 
 def simulated_scores(engine: Engine, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -130,7 +200,10 @@ class _Beyond:
         self.is_undefined = False
 
     def __call__(self, u: np.ndarray) -> np.ndarray:
-        measured, _ = simulated_scores(self._engine, u)
+        return self.of(*simulated_scores(self._engine, u), u)
+
+    def of(self, measured: np.ndarray, _: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the scores (n,) of measures (n, state, measure) at normal scores u (n, d)."""
         is_likely = gammaincc(u.shape[1] / 2, (u**2).sum(axis=1) / 2) > NEGLIGIBLE  # otherwise only inflation leads there
         self.is_undefined |= bool(np.isnan(measured[is_likely, terms.CORRECTED, self._measure]).any())
         excess = np.nan_to_num(self._limits.excess(measured[:, terms.CORRECTED, self._measure]), nan=-np.inf, posinf=np.inf)
@@ -153,5 +226,8 @@ class NotAssemblable:
         self._engine = engine
 
     def __call__(self, u: np.ndarray) -> np.ndarray:
-        _, status = simulated_scores(self._engine, u)
+        return self.of(*simulated_scores(self._engine, u), u)
+
+    def of(self, _: np.ndarray, status: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the scores (n,) of statuses (n,) at normal scores u (n, d)."""
         return np.where(status == terms.Status.NOT_ASSEMBLABLE, 1.0, -1.0)

@@ -1,6 +1,6 @@
 """The least and the largest possible value of each measure, with the combination of deviations that causes it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import xarray as xr
 from tolcontact import poses, vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.analysis import Analysis, Engine, Progress
+from tolcontact.analyses.answers import Answer
 from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher, Searches
 from tolcontact.analyses.farthest_pose import farthest_poses
 from tolcontact.analyses.linear_model import LinearModel, linear_model
@@ -92,7 +93,7 @@ class Influences:
 
 def worst_case(
     model: Model | Program, *, samples: int = 512, seed: int = 1, solver: Solver | None = None, method: Choice | None = None,
-    into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
+    into: str | Path | None = None, client: Any = None, progress: Progress | None = None, minutes: float | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return the worst-case minimum and maximum of each measure over everything that the tolerances allow.
 
@@ -125,20 +126,25 @@ def worst_case(
     zones of forms, and the attribute `without_form` names these features. The linear estimate is exact to first order in the
     deviations: large tilts may exceed it. Only certified realizations count. `progress` is called with the number of
     realizations simulated, and the approximate total.
-    `model`, `samples` (512 by default), `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see
+    `model`, `samples` (512 by default), `seed`, `solver`, `method`, `into`, `client` and `minutes` are as in all analyses (see
     tolcontact.analyses).
 
     `tc.analyses.worst_case("model.py", solver="daqp")`
     """
     analysis = Analysis(
         terms.WORST_CASE, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
-        progress=progress,
+        progress=progress, minutes=minutes,
     )  # fmt: skip
     return search_worst_case(analysis, Effort.of(analysis.samples))
 
 
 def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     """Return the dataset of `worst_case`, by searches with a given effort."""
+    return analysis.finest(_answers(analysis, effort))
+
+
+def _answers(analysis: Analysis, effort: Effort) -> Iterator[Callable[[], Answer]]:
+    """Yield the worst of random combinations, which searches then improve, and the result of the searches."""
     analysis.check_rigid("ask for tails, or run many realizations")
     program, engine = analysis.program, analysis.engine(analysis.samples)
     region = AllowedRegion(program.draws, seed=analysis.seed)
@@ -153,36 +159,52 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     if not np.isfinite(measured[:, terms.CORRECTED]).any():
         raise OptionError(f'"{analysis.assembly}" cannot be resolved for any of {len(starts)} combinations tried')
     spread = np.nanmax(measured, axis=(0, 1)) - np.nanmin(measured, axis=(0, 1))
+    searches, bound = Searches.begin(starts, measured, effort, rng), farthest_poses(program, region, linear)
+    random = np.stack([np.nanmin(measured, axis=0), np.nanmax(measured, axis=0)], axis=-1).swapaxes(0, 1)
+
+    def answer(best: Searches | None = None) -> Answer:
+        values = _extremes(program, region, effort, spread, searches, best or searches.best_of(effort.searches))
+        text = f"the worst among {len(starts)} combinations, and of searches that have not ended"
+        return _answer(analysis, effort, values | {"bound": bound, "random": random, "by_status": engine.statuses}, text)
+
+    yield answer
     influences = Influences(region, evaluation, spread)
     influences.explore(starts[rng.choice(len(starts), EXCHANGES)], region.scattered(rng, EXCHANGES))
-    searches = Searches.begin(starts, measured, effort, rng)
     searcher = Searcher(region, evaluation, spread, influences.is_active, rng, effort.finest_step)
     advanced = _forecast(engine, influences.is_active.sum(axis=1), effort)
     best = _searched(searcher, searches, influences, effort, advanced, region.scattered(rng, EXCHANGES))
     _check_defined(program, evaluation.is_undefined)
+    yield lambda: answer(best)
+
+
+def _extremes(
+    program: Program, region: AllowedRegion, effort: Effort, spread: np.ndarray, searches: Searches, best: Searches
+) -> dict[str, np.ndarray]:
+    """Return the variables of the best searches, and how many searches agree with them."""
     values = searches.value.reshape(-1, effort.searches)
     tolerances = END_TOLERANCE * spread[best.measure]
     ends = 1 + (np.diff(np.sort(values[:, effort.best :], axis=1), axis=1) > tolerances[:, None]).sum(axis=1)
     corrected = best.take(np.flatnonzero(best.state == terms.CORRECTED))
     shape = (len(program.nominal.measures), len(terms.STATES), len(terms.ENDS))
-    arrays = {
+    return {
         "worst": (best.sense * best.value).reshape(shape),
         "deviations": region.deviations(best.point).reshape(*shape, -1),
-        "bound": farthest_poses(program, region, linear),
-        "random": np.stack([np.nanmin(measured, axis=0), np.nanmax(measured, axis=0)], axis=-1).swapaxes(0, 1),
         "agreeing": (values >= (values.max(axis=1) - tolerances)[:, None]).sum(axis=1).reshape(shape),
         "ends": ends.reshape(shape),
         "unseen": np.minimum(1.0, ends * (ends + 1) / (effort.random * (effort.random - 1))).reshape(shape),
-        "by_status": engine.statuses,
         **_as_realizations(program, region.deviations(corrected.point)),
     }
+
+
+def _answer(analysis: Analysis, effort: Effort, values: dict[str, np.ndarray], coarse: str) -> Answer:
+    """Return the answer with these values."""
+    program = analysis.program
     cases = [f"{end} {measure.name}" for measure in program.nominal.measures for end in terms.ENDS]
     labels = [contributor.label for contributor in program.draws.contributors if contributor.source == FORM]
     formed = dict.fromkeys(label.rpartition(".")[0] for label in labels)
-    return analysis.dataset(
-        arrays, {terms.CASE: cases}, random_combinations=analysis.samples, searches=effort.searches,
-        **({terms.WITHOUT_FORM: ", ".join(formed)} if formed else {}),
-    )  # fmt: skip
+    without = {terms.WITHOUT_FORM: ", ".join(formed)} if formed else {}
+    attributes = {"random_combinations": analysis.samples, "searches": effort.searches, **without}
+    return Answer(values, {terms.CASE: cases}, attributes, coarse)
 
 
 def _check_defined(program: Program, is_undefined: np.ndarray) -> None:

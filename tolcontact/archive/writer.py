@@ -285,13 +285,14 @@ if TYPE_CHECKING:
 
 
 def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Program) -> None:
-    """Raise ArchiveError unless an archive is of the program's model and does not hold this analysis yet."""
+    """Raise ArchiveError unless an archive is of the program's model and holds no complete answer of this analysis yet."""
     archive = Path(os.path.realpath(path))
     check_archive(archive)
     with open_netcdf(archive, "r") as file:
         check_same_model(file, archive, program)
-        if terms.ANALYSES_GROUP in file.groups and record.name in file[terms.ANALYSES_GROUP].groups:
-            group = f"{terms.ANALYSES_GROUP}/{record.name}"
+        group = f"{terms.ANALYSES_GROUP}/{record.name}"
+        is_stored = terms.ANALYSES_GROUP in file.groups and record.name in file[terms.ANALYSES_GROUP].groups
+        if is_stored and terms.COARSE not in file[group].ncattrs():
             raise ArchiveError(f'"{path}" already has {group}, which is not replaced; choose another archive')
 
 
@@ -308,4 +309,10 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", 
             for array in stored.variables.values():
                 array.encoding = {"fletcher32": True} | ({"dtype": "S1"} if array.dtype.kind in "UO" else {})
             group = f"{terms.ANALYSES_GROUP}/{record.name}"
-            stored.to_netcdf(files.plain_path(part), mode="a", group=group, engine="netcdf4")
+            with open_netcdf(part, "r+") as file:  # a complete answer replaces a coarse one
+                if terms.ANALYSES_GROUP in file.groups and record.name in file[terms.ANALYSES_GROUP].groups:
+                    file[group].delncattr(terms.COARSE)
+            try:
+                stored.to_netcdf(files.plain_path(part), mode="a", group=group, engine="netcdf4")
+            except ValueError as error:  # other groups, events, ...
+                raise ArchiveError(f'"{path}" has a coarse {group} of other options; choose another archive') from error

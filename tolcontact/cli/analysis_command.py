@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tolcontact import analyses
+from tolcontact import analyses, interrupts
 from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
 from tolcontact.cli.analyses import COMMANDS, REQUIRED, AnalysisCommand
@@ -23,7 +23,7 @@ SHARED = {  # options of analyses, with their defaults, and the argument of an a
     "resolution": (common.Resolution, None, "method"), "objective": (common.Objective, None, "method"),
     "as_json": (common.AsJson, False, "model"), "as_csv": (common.AsCsv, False, "model"), "into": (common.Into, None, "into"),
     "workers": (common.Workers, None, "client"), "scheduler": (common.Scheduler, None, "client"),
-    "quiet": (common.Quiet, False, "progress"),
+    "minutes": (common.Minutes, None, "minutes"), "quiet": (common.Quiet, False, "progress"),
 }  # fmt: skip
 
 
@@ -70,13 +70,19 @@ def _run(
         method = common.method_choices(resolution=resolution, objective=objective)
         shared = {"method": method, "client": client, "progress": show}
         arguments |= {name: value for name, value in shared.items() if name in parameters}
-        dataset = getattr(analyses, command.analysis)(model, **arguments)
+        stopped = ""
+        try:
+            dataset = getattr(analyses, command.analysis)(model, **arguments)
+        except analyses.Stopped as stop:
+            dataset, stopped = stop.dataset, str(stop)
     if as_json:
         print_data(dataset)
     elif as_csv:
         print_csv(command.frame(dataset))
     else:
         console().print(analysis_text(command.record, dataset))
+    if stopped:
+        interrupts.end(stopped)
     if "met" in dataset and not dataset["met"].all():
         names = ", ".join(f'"{name}"' for name in dataset["requirement"].values[dataset["met"].values == 0])
         common.echo(f"error: not met: {names}", err=True)

@@ -87,6 +87,9 @@ Scheduler = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786."),
 ]
+Minutes = Annotated[
+    float | None, typer.Option(help="Time after which the answer so far is printed, which says so; so does Ctrl-C.")
+]
 Quiet = Annotated[bool, flag("--quiet", "Print results only: no progress, no notices.")]
 
 

@@ -1,4 +1,5 @@
 from .analysis_tables import analysis_text as analysis_text
+from .brief import brief_lines as brief_lines
 from .comparison_text import comparison_text as comparison_text, runs_text as runs_text
 from .figures import grouped as grouped
 from .html import (

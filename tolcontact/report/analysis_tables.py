@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -31,17 +31,23 @@ class AnalysisReport:
     name     prefix of the titles of its tables on a page
     count    the simulated realizations, in words
     notes    lines that explain the tables
+    main     the most important column of the tables
     """
 
     name: str
     count: str
     notes: Sequence[str]
     tables: Sequence[Table]
+    main: int = 1
 
 
 def analysis_report(record: terms.AnalysisRecord, dataset: xr.Dataset) -> AnalysisReport:
     """Return the report of the dataset of an analysis."""
-    return _REPORTS[record.name](dataset)
+    report = _REPORTS[record.name](dataset)
+    if coarse := dataset.attrs.get(terms.COARSE):
+        notes = [f"COARSE, {coarse}. More time or realizations give the complete answer.", *report.notes]
+        report = replace(report, notes=notes)
+    return report
 
 
 def analysis_text(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Group:
@@ -66,7 +72,7 @@ def _ppm(values: np.ndarray, *, sign: bool = False) -> str:
 def _contributions(dataset: xr.Dataset) -> AnalysisReport:
     notes = ["Shares of variance: alone, and in total, together with others; 95 % intervals.", *_lost(_unresolved(dataset))]
     tables = [table for measure in dataset["measure"].values for table in _shares(dataset.sel(measure=measure))]
-    return AnalysisReport("Contributions", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables)
+    return AnalysisReport("Contributions", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables, main=3)
 
 
 def _shares(dataset: xr.Dataset) -> Iterator[Table]:
@@ -75,8 +81,10 @@ def _shares(dataset: xr.Dataset) -> Iterator[Table]:
     raw, corrected = (percent(dataset["missed"].sel(state=state).values) for state in terms.STATES)
     missed = [f"missed by linear sensitivities:\n  {terms.WITHOUT_CONTACT} {raw}, {terms.WITH_CONTACT} {corrected}"]
     largest = dataset["total"].sel(interval="estimate").max("state", skipna=True)
-    rows = []
-    for group in _by_size(dataset["total"]):
+    order, rows = _by_size(dataset["total"]), []
+    if not dataset.attrs["base_realizations"]:  # only linear shares are known
+        largest, order = dataset["linear"], np.argsort(-dataset["linear"].values, kind="stable")
+    for group in order:
         if float(largest[group]) < SMALL_SHARE:
             continue
         shares = dataset.isel(group=group)
@@ -134,13 +142,15 @@ def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
         rows = [[str(dataset["contributor"].values[k]), f"{leverage[k]:.3g}"] for k in order]
         title = "Leverage of locators: the largest displacement of a point of their part for 1 mm"
         tables.append(Table(title, ["", "leverage"], rows))
-    return AnalysisReport("Sensitivities", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables)
+    return AnalysisReport("Sensitivities", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables, main=4)
 
 
 def _slopes(dataset: xr.Dataset) -> Table:
     """Return the derivatives of a measure, starting with the contributors that have the largest effect."""
     mean = np.abs(dataset["sensitivity"].sel(interval="estimate").values).max(axis=0)
     size = np.fmax(mean, dataset["spread"].max("state").values)
+    if not dataset.attrs["realizations"]:  # only nominal derivatives are known
+        size = np.abs(dataset["nominal"].values)
     rows = []
     for k in np.argsort(-size * dataset["step"].values, kind="stable"):
         if not size[k] > SMALL_SLOPE * np.nanmax(size):

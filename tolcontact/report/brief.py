@@ -1,16 +1,16 @@
-"""The brief summary: of many measurements, parts and pairs those that fall short, and how many others there are."""
+"""What is printed in brief: the measurements that fall short, of many; coarse answers of analyses."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.report.analysis_tables import analysis_report
 from tolcontact.report.results_table import verdict_of
-from tolcontact.report.table import Table
 from tolcontact.statistics.capability import CONSTANT, FAILS, MEETS, UNDECIDED
 
+BRIEF_TABLES, BRIEF_ROWS = 10, 4  # of a coarse answer in brief: the first tables, and the rows of each that a line has
 MOST_DETAILED, MOST_LISTED = 3, 6  # measurements with all their figures; measurements, parts or pairs in a table
 EVERYTHING = "the page has all, and so has tolcontact summary --all"
 URGENCY = {FAILS: 2.0, UNDECIDED: 1.0, "": 0.0, CONSTANT: -1.0, MEETS: -1.0}
@@ -47,19 +47,17 @@ def brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
     return summary.isel(measure=selection), f"{remark}; {EVERYTHING}"
 
 
-def brief_table(table: Table, weights: Sequence[float] | np.ndarray, phrase: str, rows_of_each: int = 1) -> Table:
-    """Return a table of the items with the largest weights (item,), each of several rows.
-
-    A remark has the number of the other items, and a `phrase` about them.
-    """
-    if len(weights) <= MOST_LISTED:
-        return table
-    selection = [index for index in _largest(weights, MOST_LISTED) if weights[index] > 0]
-    rows = [row for index in selection for row in table.rows[index * rows_of_each : (index + 1) * rows_of_each]]
-    remark = f"{len(weights) - len(selection)} more {phrase}; {EVERYTHING}"
-    return replace(table, rows=rows, remarks=[*table.remarks, remark])
-
-
 def _largest(weights: Sequence[float] | np.ndarray, count: int) -> list[int]:
     """Return the indices of the largest weights in ascending order."""
     return sorted(np.argsort(-np.asarray(weights, dtype=float), kind="stable")[:count].tolist())
+
+
+def brief_lines(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Iterator[str]:
+    """Yield a coarse answer in brief: what it rests on, and the first rows of its first tables."""
+    report = analysis_report(record, dataset)
+    yield f"{report.name.lower()} {dataset.attrs[terms.COARSE]}"
+    tables = [table for table in report.tables if len(table.columns) > report.main and (table.title or len(report.tables) == 1)]
+    for table in tables[:BRIEF_TABLES]:
+        rows = [[cell for cell in (row[0], row[report.main], *row[1:]) if cell != "-"][:2] for row in table.rows[:BRIEF_ROWS]]
+        known = "; ".join(" ".join(row) for row in rows if len(row) > 1)
+        yield f"  {table.title}: " * bool(table.title) + (known or "not known yet")

@@ -187,16 +187,21 @@ def has_no_verdict(summary: xr.Dataset) -> bool:
     return bool((has_limits & (summary[terms.NOT_A_NUMBER].values > 0)).any())
 
 
-def overview_table(summary: xr.Dataset) -> Table:
-    """Return the short table of a terminal: mean, 6 sigma, Ppk and share out of specification by measure and state."""
+def overview_table(summary: xr.Dataset, *, is_long: bool = False) -> Table:
+    """Return the short table of a terminal: mean, 6 sigma, Ppk and share out of specification by measure and state.
+
+    In a long summary it only has figures with contact.
+    """
     rows, units = [], share_units(summary)
+    words = dict(zip(terms.STATE_WORDS, terms.STATES, strict=True))
     for name in summary["measure"].values:
         measure = summary.sel(measure=name)
-        rows.append([full_name(measure), "", "", "", ""])
+        if not is_long:
+            rows.append([full_name(measure), "", "", "", ""])
         values = measure["statistic_value"].sel(statistic=[terms.MEAN, terms.SIX_SIGMA, terms.PPK, terms.OUTSIDE])
-        for word, state in zip(terms.STATE_WORDS, terms.STATES, strict=True):
-            mean, spread, ppk, outside = values.sel(state=state).values
-            rows.append(
-                [f"  {word}", number(mean), number(spread), number(ppk), share_in(outside, units).replace(" [", f" {units} [")]
-            )
-    return Table("", ["", "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN], rows)
+        for word in [terms.WITH_CONTACT] if is_long else words:
+            mean, spread, ppk, outside = values.sel(state=words[word]).values
+            figures = [number(mean), number(spread), number(ppk), share_in(outside, units).replace(" [", f" {units} [")]
+            rows.append([full_name(measure) if is_long else f"  {word}", *figures])
+    heading = terms.WITH_CONTACT if is_long else ""
+    return Table("", [heading, "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN], rows)

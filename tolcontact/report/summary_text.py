@@ -1,7 +1,7 @@
 """The summary of a run as text."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from rich.text import Text
 from scipy import special
 
 from tolcontact import vocabulary as terms
-from tolcontact.report.brief import EVERYTHING, MOST_DETAILED, brief_measures, brief_table
+from tolcontact.report.brief import EVERYTHING, MOST_DETAILED, MOST_LISTED, brief_measures
 from tolcontact.report.convention_text import convention_lines, offset_lines, offset_table
 from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
 from tolcontact.report.results_table import full_name, overview_table, verdict_lines
@@ -22,6 +22,10 @@ from tolcontact.statistics.intervals import CONFIDENCE, MAX_KURTOSIS, MIN_SHAPE,
 from tolcontact.statistics.sample import MIN_APART
 
 RAW, CORRECTED = terms.STATES
+MOST_IN_LINE = 2  # parts or pairs, in a line of a long summary
+MOST_CLASHES = 2  # pairs of parts that lie in each other, in a long summary
+CHANGES_NOTE = "Changes are from the same draws.\n"
+DEEPEST = "largest penetration between surfaces"
 CHANGE_OF_STATISTIC = {"mean": terms.SHIFT, "6 sigma": terms.SPREAD_RATIO, "variance": terms.VARIANCE_RATIO}
 SHORT_LABELS = {"standard deviation": "std. dev.", terms.BELOW: "below the lower limit", terms.ABOVE: "above the upper limit",
                 terms.OUTSIDE: terms.OUT_OF_SPECIFICATION}  # fmt: skip
@@ -50,37 +54,53 @@ def _sections(summary: xr.Dataset, *, is_whole: bool) -> Iterator[Text | Table |
     yield Text(f"{summary.attrs['title']}: {count} realizations", style="bold")
     if summary.attrs["samples"] > count:
         yield Text(f"{grouped(count)} of {grouped(summary.attrs['samples'])} realizations are done; continue with --resume")
-    yield Text(f"{terms.ESTIMATES_NOTE}.\nChanges are from the same draws.\n")
+    is_long = not is_whole and max(summary.sizes["part"], summary.sizes["pair"]) > MOST_LISTED
+    yield Text(f"{terms.ESTIMATES_NOTE}.\n{'' if is_long else CHANGES_NOTE}")
     brief, remark = (summary, "") if is_whole else brief_measures(summary)
-    yield overview_table(brief)
-    has_details = is_whole or summary.sizes["measure"] <= MOST_DETAILED
+    yield overview_table(brief, is_long=is_long)
+    has_details = is_whole or (summary.sizes["measure"] <= MOST_DETAILED and not is_long)
     yield from map(Text, verdict_lines(brief, states_once=not has_details))
     if has_details:
         yield from (measure_table(summary.sel(measure=name), summary.sizes["measure"]) for name in summary["measure"].values)
-    else:
+    elif remark or not is_long:
         yield Text(remark or f"percentiles and capability of each: {EVERYTHING}")
     if not summary.sizes["part"]:
         return
     magnitudes = int(summary["magnitude_realizations"])
-    yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
-    if magnitudes < count:
-        yield Text(f"of at least the first {grouped(magnitudes)} realizations" if magnitudes else "not summed up")
-    if magnitudes:
-        yield _field_table(summary, is_whole=is_whole)
+    if not is_long:
+        yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
+        if magnitudes < count:
+            yield Text(f"of at least the first {grouped(magnitudes)} realizations" if magnitudes else "not summed up")
+        if magnitudes:
+            yield _field_table(summary)
     yield Text("\ncontact", style="bold")
-    for line in contact_lines(summary, count):
+    for line in contact_lines(summary, count, is_long=is_long):
         yield Padding(Text(line), (0, 0, 0, 2), expand=False)
+    if is_long:
+        yield from map(Text, _long_lines(summary))
+        return
     pairs, offsets = pair_table(summary) if summary.sizes["pair"] else None, offset_table(summary)
-    if pairs is not None and not is_whole:
-        pairs = brief_table(pairs, summary["carried"].sel(interval="estimate").values, "are in contact less often, or never")
-    if offsets is not None and not is_whole:
-        moved = summary.isel(part=[k for k, part in enumerate(summary["part"].values) if part in offsets.names])
-        offsets = brief_table(
-            offsets, moved["offset_beyond"].sel(interval="estimate").values, "are moved so far less often, or never"
-        )
     for table in filter(None, (pairs, offsets)):
         yield Text()
         yield table
+
+
+def _long_lines(summary: xr.Dataset) -> Iterator[str]:
+    """Yield the largest displacements, contacts and offsets of many parts and pairs, a line each, and what is left out."""
+
+    def line(heading: str, names: np.ndarray, values: xr.DataArray, text: Callable[[np.ndarray], str]) -> str:
+        estimates = values.transpose(..., "interval").values
+        order = [k for k in np.argsort(-estimates[:, 0], kind="stable")[:MOST_IN_LINE] if estimates[k, 0] > 0]
+        items = ", ".join(f"{names[k]} {text(estimates[k])}" for k in order)
+        return f"{heading}: {items or 'none'}" + (f"; {len(names) - len(order)} more" if order else "")
+
+    parts, pairs = summary["part"].values, summary["pair"].values
+    if int(summary["magnitude_realizations"]):
+        fields = summary["field_extreme"].sel(state=CORRECTED, extreme="largest")
+        yield line("move most (6 sigma, mm)", parts, fields, number)
+    yield line("in contact most", pairs, summary["carried"], percent)
+    yield line("furthest off their locators (99 %, mm)", parts, summary["locator_offset"].isel(of_offset=-1), number)
+    yield f"results without contact, percentiles, all parts and pairs, other checks: {EVERYTHING}"
 
 
 def capability_text(summary: xr.Dataset) -> Group:
@@ -159,7 +179,7 @@ def _measure_rows(measure: xr.Dataset, measures: int) -> list[list[str]]:
     return rows
 
 
-def _field_table(summary: xr.Dataset, *, is_whole: bool) -> Table:
+def _field_table(summary: xr.Dataset) -> Table:
     """Return the table of the displacement fields of the parts that move."""
     rows = []
     is_moving = (summary["field_extreme"].values != 0).any(axis=(1, 2, 3))
@@ -168,9 +188,7 @@ def _field_table(summary: xr.Dataset, *, is_whole: bool) -> Table:
             field = summary["field_extreme"].sel(part=part, state=state)
             extremes = [number(field.sel(extreme=extreme).values) for extreme in ("least", "largest")]
             rows.append([str(part), terms.WORD_OF_STATE[state], *extremes])
-    table = Table("", ["part", "", "smallest", "largest"], rows)
-    largest = summary["field_extreme"].sel(state=CORRECTED, extreme="largest", interval="estimate").values[is_moving]
-    return table if is_whole else brief_table(table, largest, "move less", len(terms.STATES))
+    return Table("", ["part", "", "smallest", "largest"], rows)
 
 
 def pair_table(summary: xr.Dataset) -> Table:
@@ -183,13 +201,16 @@ def pair_table(summary: xr.Dataset) -> Table:
     return Table("", ["contact pair", terms.IN_CONTACT, heading, "95th\npercentile"], rows)
 
 
-def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
-    """Yield lines about the contact of a run of `count` realizations."""
-    yield f"realizations touched by contact: {percent(summary['touched'].values)}"
+def contact_lines(summary: xr.Dataset, count: int, *, is_long: bool = False) -> Iterator[str]:
+    """Yield lines about the contact of a run of `count` realizations; only what failed, if it is part of a long summary."""
+    if not is_long:
+        yield f"realizations touched by contact: {percent(summary['touched'].values)}"
     by_status = _by_status(summary)
     yield "status: " + ", ".join(f"{n} {meaning}" for meaning, n in by_status.items() if n)
     conflicts = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
-    if conflicts:
+    if conflicts and is_long:
+        yield f"not assemblable, so out of specification, and left out of other statistics: {', '.join(conflicts)}"
+    elif conflicts:
         share = percent(summary["not_assemblable"].values)
         yield f"not assemblable: {share}; these count as out of specification, and other statistics with contact leave them out"
         yield f"pairs in conflict there: {', '.join(conflicts)}"
@@ -197,9 +218,15 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
         yield f"not converged: {unconverged} of {count}; the statistics include their last poses"
     if doubtful := by_status["doubtful"]:
         yield from _doubts(summary, int(doubtful), count)
-    yield from _clashes(summary, count)
+    yield from _clashes(summary, count, is_long=is_long)
     raw, corrected = (settled(float(summary["penetration"].sel(state=state))) for state in (RAW, CORRECTED))
     median, largest = summary["iterations"].values
+    if is_long:
+        yield from (line for line in (*_between(summary, count), *_advice(summary, corrected)) if not line.startswith(DEEPEST))
+        yield from offset_lines(summary)
+        if len(lines := [*convention_lines(summary)]) > 3:  # results depend on it
+            yield from lines
+        return
     steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
     yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
     yield from convention_lines(summary)
@@ -219,8 +246,13 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
 def _doubts(summary: xr.Dataset, doubtful: int, count: int) -> Iterator[str]:
     """Yield lines about answers that are not certified."""
     in_bodies = min(int(summary["clash_count"].values[summary["clash_declared"].values == 1].sum()), doubtful)
-    if in_bodies < doubtful:
-        number_far = f"{doubtful - in_bodies} of {count}"
+    number_far = f"{doubtful - in_bodies} of {count}"
+    if in_bodies < doubtful and summary["clash_share"].values[0] > 0:  # whose pairs are named instead of declared ones
+        yield (
+            f"doubtful: {number_far}: parts of a contact pair lie in each other beyond its faces, or too far from their poses "
+            "without contact; tolcontact check names these faces"
+        )
+    elif in_bodies < doubtful:
         yield f"doubtful: {number_far} answers lie too far from the pose without contact to be certified"
     if in_bodies:
         parts = ", ".join(_clashes_of(summary, is_declared=True))
@@ -228,7 +260,7 @@ def _doubts(summary: xr.Dataset, doubtful: int, count: int) -> Iterator[str]:
         yield "advice: they probably meet beyond the chosen faces; tolcontact check names these, and writes the lines to add"
 
 
-def _clashes(summary: xr.Dataset, count: int) -> Iterator[str]:
+def _clashes(summary: xr.Dataset, count: int, *, is_long: bool = False) -> Iterator[str]:
     """Yield lines about bodies without contact that penetrate each other, and about the test of all bodies."""
     watched, share = int(summary["watched"]), summary["clash_share"].values
     if not watched:
@@ -237,9 +269,17 @@ def _clashes(summary: xr.Dataset, count: int) -> Iterator[str]:
         yield f"bodies were not tested for interference {reason}: certificates hold for contact points"
         return
     if share[0] > 0:
-        yield f"parts without declared contact lie in each other: {percent(share)} of realizations; verdicts do not hold there"
-        yield f"these parts, where they lie deepest: {', '.join(_clashes_of(summary, is_declared=False))}"
+        clashes = _clashes_of(summary, is_declared=False)
+        if is_long:  # the verdicts state the share
+            rest = [f"{len(clashes) - MOST_CLASHES} more"] if len(clashes) > MOST_CLASHES else []
+            yield f"parts without declared contact lie in each other: {', '.join(clashes[:MOST_CLASHES] + rest)}"
+        else:
+            text = f"{percent(share)} of realizations; verdicts do not hold there"
+            yield f"parts without declared contact lie in each other: {text}"
+            yield f"these parts, where they lie deepest: {', '.join(clashes)}"
         yield "advice: declare their contact, or that it is meant: assembly.may_overlap(...); tolcontact check writes the lines"
+    if is_long:
+        return
     extent = f"all {grouped(watched)}" if watched == count else f"{grouped(watched)} of {grouped(count)}"
     depth = summary.attrs["interference_depth"]
     found = "see above" if share[0] > 0 else "none where certified"
@@ -263,7 +303,7 @@ def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
     checked, depth, overhang = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
     limit = terms.NOTICED_SHARE * summary.attrs["smallest_range"]
     if math.isfinite(depth):
-        yield f"largest penetration between surfaces: {settled(depth):.3g} mm ({checked:.0f} of {count} checked)"
+        yield f"{DEEPEST}: {settled(depth):.3g} mm ({checked:.0f} of {count} checked)"
         if depth > limit:
             share = percent(summary["penetrating_share"].values)
             least = f"{terms.NOTICED_SHARE:.0%} of the smallest tolerance"

@@ -128,6 +128,7 @@ WORST_CASE = AnalysisRecord(
     ),
     of_stations=tuple(replace(variable, dims=(CASE, *variable.dims[1:])) for variable in STATION_POSES),
 )
+COARSE = "coarse"  # attribute of an analysis that was stopped, or whose time ended: what its answer rests on
 WITHOUT_FORM = "without_form"  # attribute of worst cases: features with form, which is left out
 TAILS = AnalysisRecord(
     "tails",

@@ -5,10 +5,9 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER, compiled
+from tests.helpers import PAPER
 from tests.test_contributions import of_normal
 from tolcontact.analyses.analysis import independent_groups
-from tolcontact.analyses.contributions import first_look
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
 from tolcontact.analyses.linear_model import linear_model
 
@@ -80,10 +79,3 @@ def test_released_draws_do_not_depend_on_blocks_and_keep_correlations():
     places = released.positions(2, 0, 3000)
     kept = np.isclose(rows[:, 9], rows[:, -1], atol=1e-9)[:, labels.index("upper.A2")]
     assert np.array_equal(kept, places[:, labels.index("upper.A2")] < 9)
-
-
-def test_a_first_look_names_the_largest_linear_shares():
-    program, groups = compiled(cases.ra1()), ["a.A1", "b.top", "c.C1"]
-    heading, line = first_look(program, groups, [np.array([0.005, 0.7, 0.295])])
-    assert "without contact" in heading and line == "  corner height: b.top 70, c.C1 30"
-    assert [*first_look(program, groups, [np.full(3, np.nan)])][1].endswith(": no share, or a kink in the nominal assembly")

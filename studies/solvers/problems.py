@@ -1,6 +1,6 @@
-"""Accuracy of QP solvers on contact problems with a row for every contact point: solvers.csv and the table of the page.
+"""Accuracy of QP solvers on contact problems with a row for every contact point: problems.csv and the table of the page.
 
-    python -m studies.cost.solvers [--realizations 12] [--to FOLDER]
+    python -m studies.solvers.problems [--realizations 12] [--to FOLDER]
 
 The QPs are those of tolcontact, but with all rows, so that hundreds of them coincide or nearly do. Every solver gets the same
 ones, first in order, then reversed: an answer must not depend on the problem before it.
@@ -216,7 +216,7 @@ def table(rows: list[dict[str, Any]]) -> Table:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--realizations", type=int, default=12)
-    parser.add_argument("--to", type=Path, default=HERE, help="folder of solvers.csv and of the page")
+    parser.add_argument("--to", type=Path, default=HERE, help="folder of problems.csv and of the page")
     arguments = parser.parse_args()
     solvers: dict[str, tuple[Callable[[str, Problem], Solve], str]]
     solvers = {f"CasADi {name}": (with_casadi, name) for name in (*usable_solvers(), *REFUSED)}
@@ -230,11 +230,11 @@ def main() -> None:
             result = separately(functools.partial(trial, make, which, qps, truth))
             cells = {"note": result} if isinstance(result, str) else result
             rows.append({"problem": name, "solver": solver, **dict.fromkeys(COLUMNS), **cells})
-    with (arguments.to / "solvers.csv").open("w", encoding="utf-8", newline="") as file:
+    with (arguments.to / "problems.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, ["problem", "solver", *COLUMNS], lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
-    write(__file__, {"solvers": table(rows)}, arguments.to)
+    write(__file__, {"problems": table(rows)}, arguments.to)
 
 
 if __name__ == "__main__":
