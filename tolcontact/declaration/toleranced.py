@@ -27,6 +27,11 @@ class Toleranced(Declaration):
     tolerances: tuple[Control, ...]
 
     @property
+    def label(self) -> str:
+        """The label "part.feature", with which the labels of its freedoms begin."""
+        return f"{self.part.name}.{self.name}"
+
+    @property
     def size(self) -> Size | None:
         """The tolerance of the size; None without one."""
         return next((tolerance for tolerance in self.tolerances if isinstance(tolerance, Size)), None)
@@ -87,7 +92,7 @@ class Toleranced(Declaration):
         for form in (tolerance for tolerance in tolerances if tolerance.is_form):
             for tolerance in tolerances:
                 is_around = not tolerance.is_form and not tolerance.tangent  # a tangent plane has no form
-                contains = is_around and (not form.of.around or tolerance.kind in form.of.around)
+                contains = is_around and (tolerance.of.limits_wall or not form.of.is_round)
                 if contains and tolerance.width < form.width:
                     yield (
                         f"{form.kind} {form.width:g} is wider than {tolerance.kind} {tolerance.width:g}, which contains it; "

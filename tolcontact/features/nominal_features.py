@@ -11,15 +11,13 @@ import numpy as np
 from tolcontact.declaration import DatumTargets, Face, Feature, GeometricTolerance, Part, Pattern, Point, Variable
 from tolcontact.errors import GeometryFault
 from tolcontact.features.datum_frames import DatumShift, Declared, datum_frame, padded
-from tolcontact.features.datum_mobility import mobile
-from tolcontact.features.expansion import Expansion
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
-from tolcontact.features.nominal_feature import FaceDeviation, NominalFeature, Placement, moving_faces
+from tolcontact.features.nominal_feature import Expansion, FaceDeviation, NominalFeature, Placement, moving_faces
 from tolcontact.features.nominal_pattern import MIXED, RELATIVE, NominalPattern, unlike_members
 from tolcontact.features.tolerance_kinds import form_field_of, form_tolerance
-from tolcontact.features.tolerance_layers import tolerance_layers
+from tolcontact.features.tolerance_layers import mobile, tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
 from tolcontact.geometry.tolerances import SAME_SIZE
 
@@ -141,7 +139,7 @@ class Features:
         """
         is_shared = tolerance.simultaneous
         is_shared = declared.part.standard == "ASME" if is_shared is None else is_shared
-        owner = datum.label if is_shared else f"{declared.part.name}.{declared.name}"
+        owner = (datum.declared if is_shared else declared).label
         label = f"{owner}.mobility of datum {datum.declared.datum} of {tolerance.datums.replace(' ', '')}"
         if label not in self._gauges:
             start, k = self.first_column + len(self.freedoms), len(before)
@@ -297,7 +295,7 @@ def _displacements(pattern: NominalPattern) -> Iterator[Freedom]:
         for direction in layer.added.T:
             member = pattern.owner(direction)
             owner = declared if member is None else declared.members[member]
-            label = f"{declared.part.name}.{owner.name}.{pattern.freedom_name(direction)}"
+            label = f"{owner.label}.{pattern.freedom_name(direction)}"
             counts[label] += 1
             label = f"{label} {counts[label]}" if label.endswith((MIXED, RELATIVE)) else label
             yield Freedom(label, FEATURE, geometric=layer.tolerance)
@@ -316,7 +314,7 @@ def _follow_datums(pattern: NominalPattern, start: int, freedoms: list[Freedom])
         for shift in filter(None, (shift.moved(kept, places) for shift in layer.frame.shifts)):
             shifts.append(shift)
             names = shift.labels(layer.tolerance.datums)
-            freedoms += [Freedom(f"{pattern.label}.{name}", DATUM, rule=shift.rule) for name in names]
+            freedoms += [Freedom(f"{pattern.declared.label}.{name}", DATUM, rule=shift.rule) for name in names]
         coordinates = padded(coordinates, start + len(freedoms))
         coordinates[:, layer.columns] = layer.added
         coordinates[:, places] += effect @ layer.frame.motion[:, kept]
