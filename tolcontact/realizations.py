@@ -1,6 +1,8 @@
-"""The realizations of a run, as results and archives have them: read piece by piece."""
+"""The realizations of a run, as results and archives have them: read piece by piece; and its declared model."""
 
+import json
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -52,3 +54,8 @@ def is_assembled(status: np.ndarray) -> np.ndarray:
 def finished(results: xr.DataTree) -> int:
     """Return the number of realizations. Raises ArchiveError for a status that has no meaning."""
     return len(statuses(results.to_dataset()))
+
+
+def declaration_of(results: xr.DataTree) -> dict[str, Any]:
+    """Return the declared model, as its document."""
+    return dict(json.loads(str(results["model"][terms.DECLARATION.name].values)))
