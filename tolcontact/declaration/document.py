@@ -68,18 +68,12 @@ def to_document(
 
 def tolerance_of_entry(entry: Any) -> Size | GeometricTolerance:
     """Return a tolerance of a feature from its entry in a document. Raises ArchiveError for an entry that states none."""
-    try:
-        return CONTROL.decode(entry, Place(Sources({})))  # type: ignore[no-any-return]
-    except EntryError as error:
-        raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
+    return _archived(lambda: CONTROL.decode(entry, Place(Sources({}))))  # type: ignore[no-any-return]
 
 
 def variable_of_entry(entry: Any) -> Variable:
     """Return a variable from its entry in a document. Raises ArchiveError for an entry that states none."""
-    try:
-        return RECORDS["variables"].decode(entry, Place(Sources({})))  # type: ignore[no-any-return]
-    except EntryError as error:
-        raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
+    return _archived(lambda: RECORDS["variables"].decode(entry, Place(Sources({}))))  # type: ignore[no-any-return]
 
 
 def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
@@ -87,8 +81,13 @@ def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
 
     Raises ArchiveError for a document that `to_document` cannot have written. No code in it is run.
     """
+    return _archived(lambda: assembly_of(document, Sources(meshes)))  # type: ignore[no-any-return]
+
+
+def _archived(decode: Callable[[], Any]) -> Any:
+    """Return what an entry of an archive declares. Raises ArchiveError for an entry that no run has written."""
     try:
-        return assembly_of(document, Sources(meshes))
+        return decode()
     except EntryError as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
 

@@ -121,7 +121,8 @@ class Features:
                 )
             compartment = [datum for letter in letters for datum in known[letter]]
             patterns = [other for other in self._of(part) if other.declared.datum in letters]
-            if modifier and len(patterns) == 1 and declared.part.standard and not self._has_mate(compartment):
+            has_mate = any(not self.mated.isdisjoint(datum.feature.faces) for datum in compartment)  # contact decides its place
+            if modifier and len(patterns) == 1 and declared.part.standard and not has_mate:
                 compartment = [self._at_gauge(declared, tolerance, patterns[0], system)]
             system.append(compartment)
         return system
@@ -148,10 +149,6 @@ class Features:
             self.patterns += [gauge] if gauge.freedoms else []
             self._gauges[label] = gauge.members[0]
         return self._gauges[label]
-
-    def _has_mate(self, datums: Iterable[NominalFeature]) -> bool:
-        """Return whether a face of a datum is in a contact pair, whose contact decides where the datum lies."""
-        return any(not self.mated.isdisjoint(datum.feature.faces) for datum in datums)
 
     def _add_targets(self, targets: DatumTargets, part: int) -> None:
         """Add a datum whose features have been added before. Raises GeometryFault for a target that is not on its feature."""
@@ -341,7 +338,7 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
             f"its size is {geometry.size:.9g} mm as shaped, and {size.nominal:g} mm in its tolerance; state the size of the "
             "shape, with the limits about it"
         )
-    if size.is_for_holes not in (None, geometry.is_inner):
+    if size.tolerance_class and size.tolerance_class.isupper() != geometry.is_inner:
         kind, letters = (
             ("a hole", size.tolerance_class.upper()) if geometry.is_inner else ("no hole", size.tolerance_class.lower())
         )
