@@ -109,9 +109,9 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
         of_part = replace(place["parts"][k]["features"], part=part)
         for number, item in enumerate(of_part.converted(entry.get("features", []), list[Any])):
             part.add(TOLERANCED.decode(item, of_part[number], part=part))
-        for key, record in (("datum_targets", TARGETS), ("elastic", ELASTIC)):
-            for declared in Items(record).decode(entry.get(key, []), place["parts"][k][key]):
-                part.add(declared)
+        for targets in Items(TARGETS).decode(entry.get("datum_targets", []), place["parts"][k]["datum_targets"]):
+            part.add(targets)
+        part._elastics.extend(Items(ELASTIC).decode(entry.get("elastic", []), place["parts"][k]["elastic"]))
 
     things: dict[str, Any] = {"parts": parts}
     for name in [name for name in RECORDS if name not in ("parts", "measures")]:

@@ -132,6 +132,7 @@ class Mirroring(Causes):
         mirror = _mirror_plane(self.assembly, parts, plane, names, at)
         images = tuple(self._add("parts", mirror.add_part(part)) for part in parts)
         for part, image in zip(parts, images, strict=True):
+            image._elastics.extend(map(mirror.composed, part._elastics))
             for declared in part._declared:
                 mirrored = image.add(mirror.composed(declared))
                 if isinstance(declared, Feature | Pattern):

@@ -40,7 +40,8 @@ class Part(Deformable):
     declared_at: str = field(default_factory=script_line)
     mirror: Mirror = ""
     checks: ClassVar = {"standard": one_of(get_args(Standard)), "mirror": one_of(get_args(Mirror))}
-    _declared: "list[Feature | Pattern | DatumTargets | Elastic]" = field(default_factory=list, init=False)
+    _declared: "list[Feature | Pattern | DatumTargets]" = field(default_factory=list, init=False)
+    _elastics: list[Elastic] = field(default_factory=list, init=False)
 
     @property
     def toleranced(self) -> "tuple[Feature | Pattern, ...]":
