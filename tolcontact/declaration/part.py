@@ -242,9 +242,7 @@ class Feature(Toleranced):
             yield f"it has {len(self.faces)} faces; expected one, or two that are opposed"
 
     def __str__(self) -> str:
-        letter = f" (datum {self.datum})" if self.datum else ""
-        constituents = "; ".join([", ".join(str(face) for face in self.faces), *map(str, self.tolerances)])
-        return f"feature {self.name} of {self.part.name}{letter}: {constituents}"
+        return self.in_words(", ".join(map(str, self.faces)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -302,9 +300,7 @@ class Pattern(Toleranced):
         yield from self.tolerance_faults(max((len(member.faces) for member in self.members), default=1))
 
     def __str__(self) -> str:
-        letter = f" (datum {self.datum})" if self.datum else ""
-        constituents = "; ".join([f"{len(self.members)} members", *map(str, self.tolerances)])
-        return f"pattern {self.name} of {self.part.name}{letter}: {constituents}"
+        return self.in_words(f"{len(self.members)} members")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,8 +1,7 @@
 """Tables of analyses, the same for the terminal and the page; one function per analysis makes them from its dataset."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import xarray as xr
@@ -15,7 +14,7 @@ from tolcontact.limits import GAP_ACCURACY
 from tolcontact.report.figures import grouped, number, percent, share
 from tolcontact.report.stack_tables import stack_up_report
 from tolcontact.report.sweep_tables import sweep_report
-from tolcontact.report.table import Table
+from tolcontact.report.table import AnalysisReport, Table
 
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are only counted
@@ -23,21 +22,6 @@ AT_END = 1.001  # times the smallest factor of a tolerance: below this, it is as
 MAX_HOLDERS = 3  # of a part, in a table
 FEW_NAMES = 3  # of features in a note
 FEW_SEARCHES = 0.25  # of all: if no more than this share end at a value, a remark states that there may be worse ones
-
-
-@dataclass(frozen=True)
-class AnalysisReport:
-    """The report of an analysis for readers.
-
-    name     prefix of the titles of its tables on a page
-    count    the simulated realizations, in words
-    notes    lines that explain the tables
-    """
-
-    name: str
-    count: str
-    notes: Sequence[str]
-    tables: Sequence[Table]
 
 
 def archived_analysis(results: xr.DataTree, record: terms.AnalysisRecord) -> xr.Dataset | None:
@@ -343,7 +327,7 @@ def _seat(dataset: xr.Dataset) -> list[str]:
 
 
 _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
-    terms.STACK_UP.name: lambda dataset: AnalysisReport(*stack_up_report(dataset, _lost(_unresolved(dataset)))),
+    terms.STACK_UP.name: lambda dataset: stack_up_report(dataset, _lost(_unresolved(dataset))),
     terms.CONTRIBUTIONS.name: _contributions,
     terms.SENSITIVITIES.name: _sensitivities,
     terms.WORST_CASE.name: _worst_case,
@@ -351,5 +335,5 @@ _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
     terms.ALLOCATION.name: _allocation,
     terms.RELOCATION.name: _relocation,
     terms.SEATING.name: _seating,
-    terms.SWEEP.name: lambda dataset: AnalysisReport(*sweep_report(dataset, _lost(_unresolved(dataset.sum("position"))))),
+    terms.SWEEP.name: lambda dataset: sweep_report(dataset, _lost(_unresolved(dataset.sum("position")))),
 }
