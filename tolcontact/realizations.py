@@ -1,4 +1,4 @@
-"""The realizations of a run, as results and archives have them: read piece by piece; and its declared model."""
+"""The realizations of a run, as results and archives have them: read piece by piece; and its declared model and analyses."""
 
 import json
 from collections.abc import Iterator
@@ -59,3 +59,18 @@ def finished(results: xr.DataTree) -> int:
 def declaration_of(results: xr.DataTree) -> dict[str, Any]:
     """Return the declared model, as its document."""
     return dict(json.loads(str(results["model"][terms.DECLARATION.name].values)))
+
+
+def archived_analysis(results: xr.DataTree, record: terms.AnalysisRecord) -> xr.Dataset | None:
+    """Return an analysis from an archive, or None. Raises ArchiveError if it differs from what was written."""
+    if terms.ANALYSES_GROUP not in results.children or record.name not in results[terms.ANALYSES_GROUP].children:
+        return None
+    group = f"{terms.ANALYSES_GROUP}/{record.name}"
+    dataset = results[group].to_dataset()
+    try:
+        dataset.load()
+    except (OSError, RuntimeError) as error:
+        raise ArchiveError(f"{group} in the archive is not what was written: {error}") from error
+    if unknown := [str(name) for name in dataset.data_vars if str(name) not in record.known]:
+        raise ArchiveError(f"{group}/{unknown[0]} in the archive is not what was written")
+    return dataset

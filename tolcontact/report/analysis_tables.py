@@ -1,7 +1,8 @@
 """Tables of analyses, the same for the terminal and the page; one function per analysis makes them from its dataset."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -9,12 +10,11 @@ from rich.console import Group
 from rich.text import Text
 
 from tolcontact import vocabulary as terms
-from tolcontact.errors import ArchiveError
 from tolcontact.limits import GAP_ACCURACY
 from tolcontact.report.figures import grouped, number, percent, share
 from tolcontact.report.stack_tables import stack_up_report
 from tolcontact.report.sweep_tables import sweep_report
-from tolcontact.report.table import AnalysisReport, Table
+from tolcontact.report.table import Table
 
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are only counted
@@ -24,19 +24,19 @@ FEW_NAMES = 3  # of features in a note
 FEW_SEARCHES = 0.25  # of all: if no more than this share end at a value, a remark states that there may be worse ones
 
 
-def archived_analysis(results: xr.DataTree, record: terms.AnalysisRecord) -> xr.Dataset | None:
-    """Return an analysis from an archive, or None. Raises ArchiveError if it differs from what was written."""
-    if terms.ANALYSES_GROUP not in results.children or record.name not in results[terms.ANALYSES_GROUP].children:
-        return None
-    group = f"{terms.ANALYSES_GROUP}/{record.name}"
-    dataset = results[group].to_dataset()
-    try:
-        dataset.load()
-    except (OSError, RuntimeError) as error:
-        raise ArchiveError(f"{group} in the archive is not what was written: {error}") from error
-    if unknown := [str(name) for name in dataset.data_vars if str(name) not in record.known]:
-        raise ArchiveError(f"{group}/{unknown[0]} in the archive is not what was written")
-    return dataset
+@dataclass(frozen=True)
+class AnalysisReport:
+    """The report of an analysis for readers.
+
+    name     prefix of the titles of its tables on a page
+    count    the simulated realizations, in words
+    notes    lines that explain the tables
+    """
+
+    name: str
+    count: str
+    notes: Sequence[str]
+    tables: Sequence[Table]
 
 
 def analysis_report(record: terms.AnalysisRecord, dataset: xr.Dataset) -> AnalysisReport:
@@ -327,7 +327,7 @@ def _seat(dataset: xr.Dataset) -> list[str]:
 
 
 _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
-    terms.STACK_UP.name: lambda dataset: stack_up_report(dataset, _lost(_unresolved(dataset))),
+    terms.STACK_UP.name: lambda dataset: AnalysisReport(*stack_up_report(dataset, _lost(_unresolved(dataset)))),
     terms.CONTRIBUTIONS.name: _contributions,
     terms.SENSITIVITIES.name: _sensitivities,
     terms.WORST_CASE.name: _worst_case,
@@ -335,5 +335,5 @@ _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
     terms.ALLOCATION.name: _allocation,
     terms.RELOCATION.name: _relocation,
     terms.SEATING.name: _seating,
-    terms.SWEEP.name: lambda dataset: sweep_report(dataset, _lost(_unresolved(dataset.sum("position")))),
+    terms.SWEEP.name: lambda dataset: AnalysisReport(*sweep_report(dataset, _lost(_unresolved(dataset.sum("position"))))),
 }

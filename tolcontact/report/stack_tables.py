@@ -8,7 +8,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.figures import grouped, number
-from tolcontact.report.table import AnalysisReport, Table
+from tolcontact.report.table import Table
 from tolcontact.statistics.capability import MIN_TAIL
 
 WIDENING = 3.29 / 1.96  # from 95 % intervals to 99.9 % intervals, beyond which RSS misses the range
@@ -21,11 +21,10 @@ NOTES = (
 )
 
 
-def stack_up_report(dataset: xr.Dataset, remarks: Sequence[str]) -> AnalysisReport:
-    """Return the report of a stack-up, with remarks on its realizations."""
+def stack_up_report(dataset: xr.Dataset, remarks: Sequence[str]) -> tuple[str, str, list[str], list[Table]]:
+    """Return name, number of realizations, notes and tables of a stack-up, with remarks on its realizations."""
     count = f"{grouped(dataset.attrs['realizations'])} realizations"
-    tables = [_table(dataset.sel(measure=name)) for name in dataset["measure"].values]
-    return AnalysisReport("Stack-up", count, [*NOTES, *remarks], tables)
+    return "Stack-up", count, [*NOTES, *remarks], [_table(dataset.sel(measure=name)) for name in dataset["measure"].values]
 
 
 def _table(dataset: xr.Dataset) -> Table:

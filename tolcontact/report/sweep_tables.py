@@ -7,13 +7,13 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.figures import grouped, number, percent
-from tolcontact.report.table import AnalysisReport, Table
+from tolcontact.report.table import Table
 
 MAX_POSITIONS = 12  # rows of a table; of more, some evenly spaced ones are shown
 
 
-def sweep_report(dataset: xr.Dataset, remarks: Sequence[str]) -> AnalysisReport:
-    """Return the report of the envelope over all positions, and of the means at each."""
+def sweep_report(dataset: xr.Dataset, remarks: Sequence[str]) -> tuple[str, str, list[str], list[Table]]:
+    """Return name, count, notes and tables of the envelope over all positions, and of the means at each."""
     positions, realizations = dataset.sizes["position"], dataset.attrs["realizations"]
     notes = [
         "The least and the largest value of each realization over all positions; 95 % intervals.",
@@ -24,7 +24,7 @@ def sweep_report(dataset: xr.Dataset, remarks: Sequence[str]) -> AnalysisReport:
     heading = ["", "mean", "6 sigma", "outer\npercentile", "mostly at"]
     envelope = Table("", heading, rows, ["outer percentile: 0.135 % of the least values, 99.865 % of the largest"])
     count = f"{grouped(realizations)} realizations at {positions} positions"
-    return AnalysisReport("Mechanism", count, notes, [envelope, _means(dataset)])
+    return "Mechanism", count, notes, [envelope, _means(dataset)]
 
 
 def _rows(measure: xr.Dataset) -> list[list[str]]:

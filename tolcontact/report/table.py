@@ -1,7 +1,4 @@
-"""A table: the same for the terminal, where it fits into the width, for the page and for the spreadsheet.
-
-Tables and notes together are the report of an analysis.
-"""
+"""A table: the same for the terminal, where it fits into the width, for the page and for the spreadsheet."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -97,18 +94,3 @@ class Table:
 
     def _width(self, rows: Sequence[Sequence[str]]) -> int:
         return sum(self._widths(rows)) + BETWEEN * (len(self.columns) - 1)
-
-
-@dataclass(frozen=True)
-class AnalysisReport:
-    """The report of an analysis for readers.
-
-    name     prefix of the titles of its tables on a page
-    count    the simulated realizations, in words
-    notes    lines that explain the tables
-    """
-
-    name: str
-    count: str
-    notes: Sequence[str]
-    tables: Sequence[Table]

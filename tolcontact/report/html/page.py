@@ -17,9 +17,9 @@ from tolcontact.declaration import Assembly, Chain, TitleBlock
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
-from tolcontact.realizations import declaration_of, finished
+from tolcontact.realizations import archived_analysis, declaration_of, finished
 from tolcontact.replacing import replacing
-from tolcontact.report.analysis_tables import analysis_report, archived_analysis
+from tolcontact.report.analysis_tables import analysis_report
 from tolcontact.report.comparison_text import change_table, contributor_table, runs_lines, value_table
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares, shares_or_first_order
 from tolcontact.report.convention_text import offset_table

@@ -20,8 +20,7 @@ from tolcontact.discretization import Nominal
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry import PartPreview, preview
 from tolcontact.geometry.faces import Meshes, triangles
-from tolcontact.realizations import finished
-from tolcontact.report.analysis_tables import archived_analysis
+from tolcontact.realizations import archived_analysis, finished
 from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
 from tolcontact.report.elastic_tables import reactions_of
 from tolcontact.report.html.form_scene import MAX_GAPS, SingleStates
