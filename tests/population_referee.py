@@ -19,7 +19,7 @@ from tolcontact.features import AxisFeature, FeatureGeometry, FeatureOfSize, Lay
 from tolcontact.features.feature_geometry import Probes
 from tolcontact.features.minimum_zone import minimax, minimum_widths
 from tolcontact.features.tolerance_kinds import (
-    TOLERANCES,
+    ZONES,
     axis_zone,
     direction_zone,
     flat_axis_zone,
@@ -133,7 +133,7 @@ def _measured_zone(
 ) -> MeasuredZone:
     inside = needed <= np.asarray(allowed) * (1 + ROUNDING)
     width = float(np.quantile(needed, STATED_SHARE))
-    return MeasuredZone(pattern.label, tolerance, stated, int(inside.sum()), len(needed), width)
+    return MeasuredZone(pattern.declared.label, tolerance, stated, int(inside.sum()), len(needed), width)
 
 
 def _measured_tolerance(
@@ -188,7 +188,7 @@ def _bonus(feature: NominalFeature, tolerance: GeometricTolerance, size: np.ndar
 
 def _zone_probes(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> Probes:
     """Return the places and directions in which a feature is measured for a tolerance."""
-    if TOLERANCES[tolerance.of].zones[type(feature)] is surface_zone:
+    if ZONES[tolerance.of][type(feature)] is surface_zone:
         return feature.surface_probes
     places, directions = feature.extremes
     if tolerance.projected is None:
@@ -201,7 +201,7 @@ def _zone_probes(tolerance: GeometricTolerance, feature: FeatureGeometry, primar
 
 def _needed_width(tolerance: GeometricTolerance, feature: FeatureGeometry, residuals: np.ndarray) -> np.ndarray:
     """Return the width (n,) [mm] of the narrowest zone around what probes measured (n, point, entry) [mm]."""
-    return WIDTHS[TOLERANCES[tolerance.of].zones[type(feature)]](tolerance, feature, residuals)
+    return WIDTHS[ZONES[tolerance.of][type(feature)]](tolerance, feature, residuals)
 
 
 def _width_about_surface(tolerance: GeometricTolerance, feature: FeatureGeometry, residuals: np.ndarray) -> np.ndarray:

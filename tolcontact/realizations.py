@@ -1,6 +1,8 @@
-"""The realizations of a run, as results and archives have them: read piece by piece."""
+"""The realizations of a run, as results and archives have them: read piece by piece; and its declared model and analyses."""
 
+import json
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -52,3 +54,23 @@ def is_assembled(status: np.ndarray) -> np.ndarray:
 def finished(results: xr.DataTree) -> int:
     """Return the number of realizations. Raises ArchiveError for a status that has no meaning."""
     return len(statuses(results.to_dataset()))
+
+
+def declaration_of(results: xr.DataTree) -> dict[str, Any]:
+    """Return the declared model, as its document."""
+    return dict(json.loads(str(results["model"][terms.DECLARATION.name].values)))
+
+
+def archived_analysis(results: xr.DataTree, record: terms.AnalysisRecord) -> xr.Dataset | None:
+    """Return an analysis from an archive, or None. Raises ArchiveError if it differs from what was written."""
+    if terms.ANALYSES_GROUP not in results.children or record.name not in results[terms.ANALYSES_GROUP].children:
+        return None
+    group = f"{terms.ANALYSES_GROUP}/{record.name}"
+    dataset = results[group].to_dataset()
+    try:
+        dataset.load()
+    except (OSError, RuntimeError) as error:
+        raise ArchiveError(f"{group} in the archive is not what was written: {error}") from error
+    if unknown := [str(name) for name in dataset.data_vars if str(name) not in record.known]:
+        raise ArchiveError(f"{group}/{unknown[0]} in the archive is not what was written")
+    return dataset

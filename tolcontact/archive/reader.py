@@ -1,7 +1,6 @@
 """Reading an archive with xarray, and rebuilding its model."""
 
 import contextlib
-import json
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -20,6 +19,7 @@ from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError, OptionError
 from tolcontact.geometry import surfaces_of, with_known_surfaces
 from tolcontact.method import Method
+from tolcontact.realizations import declaration_of
 from tolcontact.system import files
 
 
@@ -65,7 +65,7 @@ def opened(results: xr.DataTree | str | Path) -> Iterator[xr.DataTree]:
 def model_of(results: xr.DataTree) -> Assembly:
     """Return the declared assembly, rebuilt from the `results` of a run: `tc.io.model_of(tc.open_archive("run.nc"))`."""
     try:
-        document = json.loads(str(results["model"][terms.DECLARATION.name].values))
+        document = declaration_of(results)
     except (KeyError, ValueError, RecursionError) as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
     meshes = {}

@@ -81,11 +81,7 @@ class Causes(Declarations):
         `model.population("batch.csv", columns={"block.top.offset": "height"}, units="um")`
         """
         expect("population: absolute", absolute, bool, "True or False")
-        sizes = {
-            f"{feature.part.name}.{feature.name}.size": feature.size.nominal
-            for feature in self.assembly.features
-            if feature.size
-        }
+        sizes = {f"{feature.label}.size": feature.size.nominal for feature in self.assembly.features if feature.size}
         expect("population: lots", lots, str | None, "the name of a column")
         table = _population(
             source, columns, script_line(), units=units, sizes=sizes if absolute else None, gauge=gauge, lots=lots, gaps=gaps

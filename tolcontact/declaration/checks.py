@@ -84,8 +84,7 @@ class Declaration(Checked):
 
     def located_faults(self, faults: Iterator[str] | None = None, owner: str = "") -> Iterator[str]:
         """Yield its faults, or some `faults` of it, after its kind, name and line; `owner` precedes these."""
-        line = f" ({self.declared_at})" if self.declared_at else ""
-        return (f'{owner}{self.noun} "{self.name}"{line}: {fault}' for fault in (self.faults() if faults is None else faults))
+        return (f"{owner}{self.designation}: {fault}" for fault in (self.faults() if faults is None else faults))
 
 
 def direction_faults(name: str, value: Vector | None) -> Iterator[str]:

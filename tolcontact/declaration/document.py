@@ -68,18 +68,12 @@ def to_document(
 
 def tolerance_of_entry(entry: Any) -> Size | GeometricTolerance:
     """Return a tolerance of a feature from its entry in a document. Raises ArchiveError for an entry that states none."""
-    try:
-        return CONTROL.decode(entry, Place(Sources({})))  # type: ignore[no-any-return]
-    except EntryError as error:
-        raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
+    return _archived(lambda: CONTROL.decode(entry, Place(Sources({}))))  # type: ignore[no-any-return]
 
 
 def variable_of_entry(entry: Any) -> Variable:
     """Return a variable from its entry in a document. Raises ArchiveError for an entry that states none."""
-    try:
-        return RECORDS["variables"].decode(entry, Place(Sources({})))  # type: ignore[no-any-return]
-    except EntryError as error:
-        raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
+    return _archived(lambda: RECORDS["variables"].decode(entry, Place(Sources({}))))  # type: ignore[no-any-return]
 
 
 def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
@@ -87,8 +81,13 @@ def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
 
     Raises ArchiveError for a document that `to_document` cannot have written. No code in it is run.
     """
+    return _archived(lambda: assembly_of(document, Sources(meshes)))  # type: ignore[no-any-return]
+
+
+def _archived(decode: Callable[[], Any]) -> Any:
+    """Return what an entry of an archive declares. Raises ArchiveError for an entry that no run has written."""
     try:
-        return assembly_of(document, Sources(meshes))
+        return decode()
     except EntryError as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
 
@@ -110,9 +109,9 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
         of_part = replace(place["parts"][k]["features"], part=part)
         for number, item in enumerate(of_part.converted(entry.get("features", []), list[Any])):
             part.add(TOLERANCED.decode(item, of_part[number], part=part))
-        for key, record in (("datum_targets", TARGETS), ("elastic", ELASTIC)):
-            for declared in Items(record).decode(entry.get(key, []), place["parts"][k][key]):
-                part.add(declared)
+        for targets in Items(TARGETS).decode(entry.get("datum_targets", []), place["parts"][k]["datum_targets"]):
+            part.add(targets)
+        part._elastics.extend(Items(ELASTIC).decode(entry.get("elastic", []), place["parts"][k]["elastic"]))
 
     things: dict[str, Any] = {"parts": parts}
     for name in [name for name in RECORDS if name not in ("parts", "measures")]:

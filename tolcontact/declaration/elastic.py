@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from tolcontact.declaration.checks import LENGTH, POSITIVE, Check, Checked, Declaration
 from tolcontact.declaration.values import is_finite, script_line
@@ -72,7 +72,7 @@ class Deformable(Declaration):
 
     noun: ClassVar[str] = "part"
     fixed: bool | None
-    _declared: list[Any]
+    _elastics: list[Elastic]
 
     def elastic(
         self, E: float | None = None, nu: float | None = None, *, density: float | None = None,
@@ -92,22 +92,21 @@ class Deformable(Declaration):
             E=E, nu=nu, density=density, stiffness=stiffness, nodes=nodes, pad=pad, element_size=element_size,
             declared_at=script_line(),
         )  # fmt: skip
-        self._declared.append(elastic)
+        self._elastics.append(elastic)
         return elastic
 
     @property
     def elasticity(self) -> Elastic | None:
         """Its elasticity; None for a rigid part."""
-        return next((declared for declared in self._declared if isinstance(declared, Elastic)), None)
+        return self._elastics[0] if self._elastics else None
 
     def elastic_faults(self) -> Iterator[str]:
         """Yield the faults of its elasticity."""
-        declared = [elastic for elastic in self._declared if isinstance(elastic, Elastic)]
-        for elastic in declared:
+        for elastic in self._elastics:
             yield from elastic.faults()
-        if len(declared) > 1:
-            yield f"it is declared elastic {len(declared)} times; declare it once"
-        if declared and self.fixed:
+        if len(self._elastics) > 1:
+            yield f"it is declared elastic {len(self._elastics)} times; declare it once"
+        if self._elastics and self.fixed:
             yield "it is elastic and fixed=True; leave fixed out, and hold it by its locators"
 
 

@@ -113,14 +113,6 @@ def _mesh_source(values: Document, place: Place) -> Document:
     return {"source": place.sources.meshes[place.record.name]}
 
 
-def _matrix_name(source: Any, writing: Writing) -> str:
-    return str(source) if writing.folder is None else _file_name(source, writing)
-
-
-def _matrix_file(name: str, place: Place) -> Path:
-    return Path(name) if place.sources.folder is None else _file(name, place)
-
-
 def _file_name(source: Any, writing: Writing) -> str:
     path, folder = Path(source).resolve(), writing.folder or Path()
     return (path.relative_to(folder) if path.is_relative_to(folder) else path).as_posix()
@@ -132,6 +124,7 @@ def _file(name: str, place: Place) -> Path:
     return place.sources.folder / name
 
 
+FILE_PATH = Annotated[str, Meta(description="path, from the folder of this file")]
 SHAPE = Choice(
     "Shape",
     "a box, a pin, or a file",
@@ -142,7 +135,7 @@ SHAPE = Choice(
     )),
     Record(
         Mesh, mark="file", omitted="units body chord",
-        source=Plain(Annotated[str, Meta(description="path, from the folder of this file")], _file_name, _file),
+        source=Plain(FILE_PATH, _file_name, _file),
     ),
 )  # fmt: skip
 
@@ -211,7 +204,11 @@ METHOD = Record(Method, **{  # type: ignore[arg-type]
 TITLE_BLOCK = Record(TitleBlock, omitted=" ".join(TitleBlock().entries))
 
 
-MATRIX_FILE = Plain(Annotated[str, Meta(description="path, from the folder of this file")], _matrix_name, _matrix_file)
+MATRIX_FILE = Plain(  # archives have the path as it was stated
+    FILE_PATH,
+    lambda source, writing: str(source) if writing.folder is None else _file_name(source, writing),
+    lambda name, place: Path(name) if place.sources.folder is None else _file(name, place),
+)
 ELASTIC = Record(
     Elastic, omitted="E nu density stiffness nodes pad element_size", floats="E nu density pad element_size",
     stiffness=MATRIX_FILE, nodes=MATRIX_FILE,

@@ -17,8 +17,6 @@ INSIDE, EXTREMES, TRANSLATION = RULES = get_args(Rule)
 Material = Literal["", "M", "L"]
 SYMBOLS = {"M": "Ⓜ", "L": "Ⓛ"}
 ZoneShape = Literal["round", "flat"]
-RUNOUTS = ("circular run-out", "total run-out")
-AROUND_ROUND = ("profile", "line profile", *RUNOUTS)  # kinds with zones for walls, not for axes
 USUAL_FORM = Form()
 
 
@@ -65,11 +63,13 @@ class ToleranceOptions(TypedDict, total=False):
 class ToleranceKind(Readable):
     """A kind of geometric tolerance; to call it with a width and datums makes a tolerance (see GeometricTolerance).
 
-    kind         its name in messages, JSON and archives
-    meaning      what it limits, with its clause of ISO 1101
-    options      the fields among zone, along, material, projected, outside, per, tangent and combined that it accepts
-    is_form      whether it limits form alone, and draws it by its `form`
-    around       kinds whose zones contain the zone of a form; all others if there are none
+    kind          its name in messages, JSON and archives
+    meaning       what it limits, with its clause of ISO 1101
+    options       the fields among zone, along, material, projected, outside, per, tangent and combined that it accepts
+    is_form       whether it limits form alone, and draws it by its `form`
+    is_round      whether this form is one of round walls, which the zones of axes do not contain
+    limits_wall   whether the zone of a round feature contains its wall with its form, and not its axis alone
+    has_any_size  whether that zone may have any radius
     """
 
     kind: str
@@ -77,7 +77,9 @@ class ToleranceKind(Readable):
     options: tuple[str, ...] = ()
     needs_datums: bool = True
     is_form: bool = False
-    around: tuple[str, ...] = ()
+    is_round: bool = False
+    limits_wall: bool = False
+    has_any_size: bool = False
 
     def __call__(self, width: float, datums: str = "", **options: Unpack[ToleranceOptions]) -> "GeometricTolerance":
         """Return a tolerance of a full `width` [mm] to `datums`, as in `tc.Position(0.2, "A|B|C", material="M")`.
@@ -296,13 +298,14 @@ Symmetry = ToleranceKind(
 )  # fmt: skip
 Profile = ToleranceKind(
     "profile", "profile of a surface (ISO 1101, 17.8): its location, if its datums lock it; without datums it is form alone",
-    ("outside", "tangent", "combined"), needs_datums=False,
+    ("outside", "tangent", "combined"), needs_datums=False, limits_wall=True,
 )  # fmt: skip
 LineProfile = ToleranceKind(  # the zones of all lines are taken as one zone of the surface
     "line profile",
     "profile of any line of a surface (ISO 1101, 17.7)",
     ("outside", "combined"),
     needs_datums=False,
+    limits_wall=True,
 )
 Parallelism = ToleranceKind("parallelism", "parallelism of a plane or an axis to its datums (ISO 1101, 17.9)", AXIS_OPTIONS)
 Perpendicularity = ToleranceKind(
@@ -314,8 +317,13 @@ Angularity = ToleranceKind(
 CircularRunout = ToleranceKind(  # without form deviations it equals total run-out
     "circular run-out",
     "run-out of each section of a cylinder, or of each circle of a plane, to the axis of its datums (ISO 1101, 17.15)",
+    limits_wall=True,
+    has_any_size=True,
 )
-TotalRunout = ToleranceKind("total run-out", "run-out of a cylinder or a plane to the axis of its datums (ISO 1101, 17.16)")
+TotalRunout = ToleranceKind(
+    "total run-out", "run-out of a cylinder or a plane to the axis of its datums (ISO 1101, 17.16)", limits_wall=True,
+    has_any_size=True,
+)  # fmt: skip
 Straightness = ToleranceKind(  # the lines of a cylinder or cone are drawn; an axis, or lines of a plane, need form=None
     "straightness", "straightness of lines of a surface, or of an axis (ISO 1101, 17.3)", ("per",), needs_datums=False,
     is_form=True,
@@ -325,11 +333,9 @@ Flatness = ToleranceKind(
 )
 Roundness = ToleranceKind(
     "roundness", "roundness of sections of a cylinder, cone or sphere (ISO 1101, 17.5)", needs_datums=False, is_form=True,
-    around=AROUND_ROUND,
+    is_round=True,
 )  # fmt: skip
-Cylindricity = ToleranceKind(
-    "cylindricity", "cylindricity (ISO 1101, 17.6)", needs_datums=False, is_form=True, around=AROUND_ROUND
-)
+Cylindricity = ToleranceKind("cylindricity", "cylindricity (ISO 1101, 17.6)", needs_datums=False, is_form=True, is_round=True)
 KINDS = {
     row.kind: row
     for row in (

@@ -219,6 +219,7 @@ BINARY = (
 )  # fmt: skip
 OPERANDS = {"input": 1, "const": 1, **dict.fromkeys(UNARY, 1), **dict.fromkeys(BINARY, 2)}
 MAX_STEPS = 100_000  # a longer expression takes minutes to compile
+MAX_STATIONS = 1000  # of a seam
 
 
 def tape_of(rows: list[list[Any]], place: Place, max_steps: int = MAX_STEPS) -> Tape:
@@ -241,3 +242,24 @@ def tape_of(rows: list[list[Any]], place: Place, max_steps: int = MAX_STEPS) -> 
             elif not (isinstance(operand, int) and 0 <= operand < count):
                 raise place[k].mismatch(f"a whole number from 0 to {count - 1}", operand)
     return tuple(map(tuple, rows))
+
+
+def stations(start: Point, end: Point, count: int) -> tuple[Point, ...]:
+    """Return `count` points of a part, evenly from `start` to `end`: the stations of a seam.
+
+    `tc.stations(door.point(0, 40, 0), door.point(0, 40, 700), 5)`
+    Points on a feature move with its deviation. Raises TypeError or ValueError for points of two parts or features.
+    """
+    if not (isinstance(start, Point) and isinstance(end, Point) and start.position and end.position):
+        raise TypeError(
+            f"stations: start is {start!r}, end is {end!r}; expected two points part.point(x, y, z), or two of a feature"
+        )
+    if start.part is not end.part or start.on is not end.on:
+        raise ValueError(f"stations: {start} and {end} are not points of one part, or of one feature")
+    if type(count) is not int or not 2 <= count <= MAX_STATIONS:
+        raise ValueError(f"stations: count is {count!r}; expected a whole number from 2 to {MAX_STATIONS}")
+    point: Callable[..., Point] = start.on.point if start.on else start.part.point
+    shares = [k / (count - 1) for k in range(count)]
+    return tuple(
+        point(*((1 - share) * a + share * b for a, b in zip(start.position, end.position, strict=True))) for share in shares
+    )

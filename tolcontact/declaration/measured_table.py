@@ -86,7 +86,10 @@ def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str, lots:
     title = f"of {len(table)} rows"
     labels, indices, lot_index = _columns(title, list(map(str, table.columns)), columns, units, lots)
     entries = [table.iloc[:, index].astype(object) for index in indices]
-    is_gap = [(column.isna() | column.map(_is_blank)).to_numpy(dtype=bool) for column in entries]
+    is_gap = [
+        (column.isna() | column.map(lambda cell: isinstance(cell, str) and not cell.strip())).to_numpy(dtype=bool)
+        for column in entries
+    ]
     entries = [column.mask(column.map(type).isin([bool, np.bool_])) for column in entries]
     numbers = [pd.to_numeric(column, errors="coerce").to_numpy(dtype=float) for column in entries]
     nothing = np.empty((len(table), 0))
@@ -98,10 +101,6 @@ def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str, lots:
         np.column_stack(is_gap) if is_gap else nothing.astype(bool),
         _lots(title, cells, range(1, len(table) + 1), "row"),
     )
-
-
-def _is_blank(cell: Any) -> bool:
-    return isinstance(cell, str) and not cell.strip()
 
 
 def _of_file(source: str | Path, columns: Mapping[str, str] | None, units: str, lots: str | None, gaps: Gaps) -> MeasuredTable:

@@ -67,13 +67,6 @@ class MirrorPlane:
         self.parts[part] = image
         return image
 
-    def add_features(self, part: Part) -> None:
-        """Add the images of features, datum targets and the elasticity of a part."""
-        for declared in part._declared:
-            image = self.parts[part].add(self.composed(declared))
-            if isinstance(declared, Feature | Pattern):
-                self.features.update(zip(declared.members, image.members, strict=True))
-
     def image(self, value: Any) -> Any:
         """Return the image of a value of a declaration; None for a feature without an image."""
         if isinstance(value, Part):
@@ -138,8 +131,12 @@ class Mirroring(Causes):
         """
         mirror = _mirror_plane(self.assembly, parts, plane, names, at)
         images = tuple(self._add("parts", mirror.add_part(part)) for part in parts)
-        for part in parts:
-            mirror.add_features(part)
+        for part, image in zip(parts, images, strict=True):
+            image._elastics.extend(map(mirror.composed, part._elastics))
+            for declared in part._declared:
+                mirrored = image.add(mirror.composed(declared))
+                if isinstance(declared, Feature | Pattern):
+                    mirror.features.update(zip(declared.members, mirrored.members, strict=True))
         for name, thing in list(mirror.settings(self.assembly._declared)):
             self._add(name, thing)
         return images[0] if len(images) == 1 else images

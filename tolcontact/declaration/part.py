@@ -40,7 +40,8 @@ class Part(Deformable):
     declared_at: str = field(default_factory=script_line)
     mirror: Mirror = ""
     checks: ClassVar = {"standard": one_of(get_args(Standard)), "mirror": one_of(get_args(Mirror))}
-    _declared: "list[Feature | Pattern | DatumTargets | Elastic]" = field(default_factory=list, init=False)
+    _declared: "list[Feature | Pattern | DatumTargets]" = field(default_factory=list, init=False)
+    _elastics: list[Elastic] = field(default_factory=list, init=False)
 
     @property
     def toleranced(self) -> "tuple[Feature | Pattern, ...]":
@@ -241,9 +242,7 @@ class Feature(Toleranced):
             yield f"it has {len(self.faces)} faces; expected one, or two that are opposed"
 
     def __str__(self) -> str:
-        letter = f" (datum {self.datum})" if self.datum else ""
-        constituents = "; ".join([", ".join(str(face) for face in self.faces), *map(str, self.tolerances)])
-        return f"feature {self.name} of {self.part.name}{letter}: {constituents}"
+        return self.in_words(", ".join(map(str, self.faces)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -301,9 +300,7 @@ class Pattern(Toleranced):
         yield from self.tolerance_faults(max((len(member.faces) for member in self.members), default=1))
 
     def __str__(self) -> str:
-        letter = f" (datum {self.datum})" if self.datum else ""
-        constituents = "; ".join([f"{len(self.members)} members", *map(str, self.tolerances)])
-        return f"pattern {self.name} of {self.part.name}{letter}: {constituents}"
+        return self.in_words(f"{len(self.members)} members")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

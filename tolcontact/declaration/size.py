@@ -63,11 +63,6 @@ class Size(Checked):
             object.__setattr__(self, "upper", upper)
 
     @property
-    def is_for_holes(self) -> bool | None:
-        """Whether its tolerance class is one of holes; None without a class."""
-        return str(self.tolerance_class).isupper() if self.tolerance_class else None
-
-    @property
     def tolerance(self) -> Tolerance:
         """The tolerance of deviations from the nominal size [mm]; the limits have to be numbers."""
         if not isinstance(self.distribution, str):

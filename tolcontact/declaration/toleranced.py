@@ -16,8 +16,8 @@ LETTER = re.compile(r"[A-Z]{1,2}")
 class Toleranced(Declaration):
     """A feature or a pattern, with its tolerances.
 
-    noun              its name in messages
-    has_members   whether it has several members, whose zones may be combined
+    noun         its name in messages
+    has_members  whether it has several members, whose zones may be combined
     """
 
     noun: ClassVar[str] = "feature"
@@ -25,6 +25,12 @@ class Toleranced(Declaration):
 
     part: Any
     tolerances: tuple[Control, ...]
+    datum: str | None
+
+    @property
+    def label(self) -> str:
+        """The label "part.feature", with which the labels of its freedoms begin."""
+        return f"{self.part.name}.{self.name}"
 
     @property
     def size(self) -> Size | None:
@@ -35,6 +41,11 @@ class Toleranced(Declaration):
     def geometric(self) -> tuple[GeometricTolerance, ...]:
         """The geometric tolerances, without the size."""
         return tuple(tolerance for tolerance in self.tolerances if isinstance(tolerance, GeometricTolerance))
+
+    def in_words(self, constituents: str) -> str:
+        """Return its line in the text of an assembly, with its faces or members in words."""
+        letter = f" (datum {self.datum})" if self.datum else ""
+        return f"{self.noun} {self.name} of {self.part.name}{letter}: {'; '.join([constituents, *map(str, self.tolerances)])}"
 
     def tolerance_faults(self, faces: int) -> Iterator[str]:
         """Yield the faults of the tolerances, each and together, for a number of faces."""
@@ -87,7 +98,7 @@ class Toleranced(Declaration):
         for form in (tolerance for tolerance in tolerances if tolerance.is_form):
             for tolerance in tolerances:
                 is_around = not tolerance.is_form and not tolerance.tangent  # a tangent plane has no form
-                contains = is_around and (not form.of.around or tolerance.kind in form.of.around)
+                contains = is_around and (tolerance.of.limits_wall or not form.of.is_round)
                 if contains and tolerance.width < form.width:
                     yield (
                         f"{form.kind} {form.width:g} is wider than {tolerance.kind} {tolerance.width:g}, which contains it; "

@@ -49,7 +49,7 @@ def _toleranced(assembly: Any) -> Iterator[tuple[list[str], Callable[[float], No
             if locator.tolerance is not None:
                 yield [location.part.name, f"{location.part.name}.{locator.name}"], widening(locator, "tolerance")
     for feature in (feature for part in assembly.parts for feature in part.toleranced if feature.tolerances):
-        yield [feature.part.name, f"{feature.part.name}.{feature.name}"], widening(feature, "tolerances")
+        yield [feature.part.name, feature.label], widening(feature, "tolerances")
     for variable in assembly.variables:
         yield [variable.name], widening(variable, "tolerance")
 

@@ -47,7 +47,7 @@ def measured_planes(model: Assembly, feature: str, parts: Sequence[Any]) -> Meas
     `model.population(tc.io.measured_planes(model, "block.top", [np.loadtxt("part1.txt"), np.loadtxt("part2.txt")]).values)`
     """
     nominal = discretize(model, incomplete=True)
-    patterns = {pattern.label: pattern for pattern in nominal.patterns if not pattern.is_gauge}
+    patterns = {pattern.declared.label: pattern for pattern in nominal.patterns if not pattern.is_gauge}
     if feature not in patterns:
         listed = ", ".join(patterns) or "none"
         raise OptionError(

@@ -4,12 +4,11 @@
 """
 
 from tolcontact.features.datum_frames import DatumShift, datum_frame, datum_order
-from tolcontact.features.expansion import Expansion
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, PlaneFeature
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.form_field import FormField
 from tolcontact.features.freedoms import Freedom
-from tolcontact.features.nominal_feature import FaceDeviation, NominalFeature, Placement
+from tolcontact.features.nominal_feature import Expansion, FaceDeviation, NominalFeature, Placement
 from tolcontact.features.nominal_features import Features
 from tolcontact.features.nominal_pattern import Layer, NominalPattern
 from tolcontact.features.tolerance_layers import uncontrolled

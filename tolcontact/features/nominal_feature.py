@@ -8,7 +8,15 @@ import numpy as np
 from tolcontact.declaration import Feature
 from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import placed_twist
-from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature, target_point
+from tolcontact.features.feature_geometry import (
+    AxisFeature,
+    ConeFeature,
+    FeatureGeometry,
+    FeatureOfSize,
+    GeneralFeature,
+    SlabFeature,
+    target_point,
+)
 from tolcontact.features.form_field import FormField
 from tolcontact.geometry.faces import FaceArea
 from tolcontact.geometry.surface import Surface
@@ -66,6 +74,50 @@ class FaceDeviation:
 
 
 @dataclass(frozen=True, eq=False)
+class Expansion:
+    """The thermal expansion of a part away from the origin of its frame: a point p goes to (1 + strain) p, and sizes grow.
+
+    columns       (cause,) of the temperatures among the deviations
+    coefficients  (cause,) strain per unit of each temperature
+    """
+
+    columns: np.ndarray
+    coefficients: np.ndarray
+
+    def of_face(
+        self, name: str, deviation: FaceDeviation | None, geometry: FeatureGeometry, placement: Placement
+    ) -> FaceDeviation:
+        """Return the deviation of a face that expands, in addition to the `deviation` of its feature.
+
+        A plane, cylinder, cone or sphere keeps its kind: it moves, and grows in height if it has a radius. Its rim follows its
+        centre alone. Raises GeometryFault for a general surface.
+        """
+        if isinstance(geometry, GeneralFeature):
+            raise GeometryFault(f"it is {geometry.in_words}, whose expansion is not known; choose planes and round faces")
+        fixed_point = geometry.apex if isinstance(geometry, ConeFeature) else geometry.centre
+        height = geometry.growth(0, (True,))[1] * geometry.size if isinstance(geometry, FeatureOfSize) else 0.0
+        return self._added(name, deviation, fixed_point, height, placement)
+
+    def of_point(self, name: str, deviation: FaceDeviation | None, position: np.ndarray, placement: Placement) -> FaceDeviation:
+        """Return the deviation of a point (3,) [mm] of the part that expands, in addition to the `deviation` of its feature."""
+        return self._added(name, deviation, position, 0.0, placement)
+
+    def _added(
+        self, name: str, deviation: FaceDeviation | None, position: np.ndarray, height: float, placement: Placement
+    ) -> FaceDeviation:
+        R, t = placement
+        if deviation is None:
+            deviation = FaceDeviation(name, np.zeros(0, dtype=int), R @ position + t, np.zeros((6, 0)), np.zeros(0))
+        motion = np.outer(np.concatenate([R @ position, np.zeros(3)]), self.coefficients)
+        return replace(
+            deviation,
+            columns=np.concatenate([deviation.columns, self.columns]),
+            twist=np.hstack([deviation.twist, motion]),
+            height=np.concatenate([deviation.height, height * self.coefficients]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class NominalFeature:
     """A feature in its part, alone or as a member of a pattern. A datum target is a feature at one point of another.
 
@@ -91,7 +143,7 @@ class NominalFeature:
 
     @property
     def label(self) -> str:
-        return f"{self.feature.part.name}.{self.feature.name}"
+        return self.feature.label
 
     @property
     def varies(self) -> bool:

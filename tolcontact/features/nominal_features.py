@@ -11,15 +11,13 @@ import numpy as np
 from tolcontact.declaration import DatumTargets, Face, Feature, GeometricTolerance, Part, Pattern, Point, Variable
 from tolcontact.errors import GeometryFault
 from tolcontact.features.datum_frames import DatumShift, Declared, datum_frame, padded
-from tolcontact.features.datum_mobility import mobile
-from tolcontact.features.expansion import Expansion
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
-from tolcontact.features.nominal_feature import FaceDeviation, NominalFeature, Placement, moving_faces
+from tolcontact.features.nominal_feature import Expansion, FaceDeviation, NominalFeature, Placement, moving_faces
 from tolcontact.features.nominal_pattern import MIXED, RELATIVE, NominalPattern, unlike_members
 from tolcontact.features.tolerance_kinds import form_field_of, form_tolerance
-from tolcontact.features.tolerance_layers import tolerance_layers
+from tolcontact.features.tolerance_layers import mobile, tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
 from tolcontact.geometry.tolerances import SAME_SIZE
 
@@ -123,7 +121,8 @@ class Features:
                 )
             compartment = [datum for letter in letters for datum in known[letter]]
             patterns = [other for other in self._of(part) if other.declared.datum in letters]
-            if modifier and len(patterns) == 1 and declared.part.standard and not self._has_mate(compartment):
+            has_mate = any(not self.mated.isdisjoint(datum.feature.faces) for datum in compartment)  # contact decides its place
+            if modifier and len(patterns) == 1 and declared.part.standard and not has_mate:
                 compartment = [self._at_gauge(declared, tolerance, patterns[0], system)]
             system.append(compartment)
         return system
@@ -141,7 +140,7 @@ class Features:
         """
         is_shared = tolerance.simultaneous
         is_shared = declared.part.standard == "ASME" if is_shared is None else is_shared
-        owner = datum.label if is_shared else f"{declared.part.name}.{declared.name}"
+        owner = (datum.declared if is_shared else declared).label
         label = f"{owner}.mobility of datum {datum.declared.datum} of {tolerance.datums.replace(' ', '')}"
         if label not in self._gauges:
             start, k = self.first_column + len(self.freedoms), len(before)
@@ -150,10 +149,6 @@ class Features:
             self.patterns += [gauge] if gauge.freedoms else []
             self._gauges[label] = gauge.members[0]
         return self._gauges[label]
-
-    def _has_mate(self, datums: Iterable[NominalFeature]) -> bool:
-        """Return whether a face of a datum is in a contact pair, whose contact decides where the datum lies."""
-        return any(not self.mated.isdisjoint(datum.feature.faces) for datum in datums)
 
     def _add_targets(self, targets: DatumTargets, part: int) -> None:
         """Add a datum whose features have been added before. Raises GeometryFault for a target that is not on its feature."""
@@ -297,7 +292,7 @@ def _displacements(pattern: NominalPattern) -> Iterator[Freedom]:
         for direction in layer.added.T:
             member = pattern.owner(direction)
             owner = declared if member is None else declared.members[member]
-            label = f"{declared.part.name}.{owner.name}.{pattern.freedom_name(direction)}"
+            label = f"{owner.label}.{pattern.freedom_name(direction)}"
             counts[label] += 1
             label = f"{label} {counts[label]}" if label.endswith((MIXED, RELATIVE)) else label
             yield Freedom(label, FEATURE, geometric=layer.tolerance)
@@ -316,7 +311,7 @@ def _follow_datums(pattern: NominalPattern, start: int, freedoms: list[Freedom])
         for shift in filter(None, (shift.moved(kept, places) for shift in layer.frame.shifts)):
             shifts.append(shift)
             names = shift.labels(layer.tolerance.datums)
-            freedoms += [Freedom(f"{pattern.label}.{name}", DATUM, rule=shift.rule) for name in names]
+            freedoms += [Freedom(f"{pattern.declared.label}.{name}", DATUM, rule=shift.rule) for name in names]
         coordinates = padded(coordinates, start + len(freedoms))
         coordinates[:, layer.columns] = layer.added
         coordinates[:, places] += effect @ layer.frame.motion[:, kept]
@@ -343,7 +338,7 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
             f"its size is {geometry.size:.9g} mm as shaped, and {size.nominal:g} mm in its tolerance; state the size of the "
             "shape, with the limits about it"
         )
-    if size.is_for_holes not in (None, geometry.is_inner):
+    if size.tolerance_class and size.tolerance_class.isupper() != geometry.is_inner:
         kind, letters = (
             ("a hole", size.tolerance_class.upper()) if geometry.is_inner else ("no hole", size.tolerance_class.lower())
         )

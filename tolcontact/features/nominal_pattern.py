@@ -62,12 +62,8 @@ class NominalPattern:
 
     @property
     def is_gauge(self) -> bool:
-        """Whether it is the gauge element of a datum (see datum_mobility)."""
+        """Whether it is the gauge element of a datum (see tolerance_layers.mobile)."""
         return self.members[0].mobility is not None
-
-    @property
-    def label(self) -> str:
-        return f"{self.declared.part.name}.{self.declared.name}"
 
     @property
     def geometries(self) -> tuple[FeatureGeometry, ...]:

@@ -1,6 +1,6 @@
 """Tolerance kinds: the features that each kind of tolerance is for, its zone, and the form that it draws.
 
-A new kind is a row in `declaration/feature_tolerance.py` and a row of TOLERANCES. A zone limits displacements of a feature; the
+A new kind is a row in `declaration/feature_tolerance.py` and a row of ZONES. A zone limits displacements of a feature; the
 datums of a tolerance leave some of these free (see tolerance_layers).
 
 A zone is a function of the tolerance, the feature, and the geometry of the first datum feature (None without datums). It
@@ -9,7 +9,6 @@ raises GeometryFault if the feature cannot have a tolerance with these options.
 """
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
 
 import numpy as np
 
@@ -35,9 +34,6 @@ from tolcontact.geometry.surface import Surface
 
 MIN_ACROSS = 0.999  # of a direction: the part of it that must lie across an axis
 Zone = Callable[[GeometricTolerance, FeatureGeometry, FeatureGeometry | None], np.ndarray]
-Zones = Mapping[type[FeatureGeometry], Zone]
-Forms = Mapping[type[FeatureGeometry], type[AssociatedSurface]]
-NO_FORMS: Forms = {}
 
 
 def surface_zone(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> np.ndarray:
@@ -117,36 +113,18 @@ def _zone_ends(tolerance: GeometricTolerance, feature: AxisFeature, primary: Fea
     return np.array([end, end * (1 + tolerance.projected / feature.half)])
 
 
-class ToleranceRow(NamedTuple):
-    """What a kind of tolerance limits.
-
-    zones        for each kind of feature that may have it
-    forms        what form deviations are measured from, for each kind of feature whose form it draws
-    limits_wall  whether the zone of a round feature contains its wall with its form, and not its axis alone
-    has_any_radius  whether that zone may have any radius
-    """
-
-    zones: Zones
-    forms: Forms = NO_FORMS
-    limits_wall: bool = False
-    has_any_radius: bool = False
-
-
 ROUND = (CylinderFeature, ConeFeature)
 FLAT = (PlaneFeature, SlabFeature)
-LOCATION = ToleranceRow(dict.fromkeys((*FLAT, SphereFeature), surface_zone) | dict.fromkeys(ROUND, axis_zone))
-ORIENTATION = ToleranceRow(dict.fromkeys(FLAT, slope_zone) | dict.fromkeys(ROUND, direction_zone))
-RUNOUT = ToleranceRow(dict.fromkeys(FLAT, slope_zone) | dict.fromkeys(ROUND, axis_zone), limits_wall=True, has_any_radius=True)
-PROFILE = ToleranceRow(
-    dict.fromkeys((*FLAT, *ROUND, SphereFeature, GeneralFeature), surface_zone),
-    dict.fromkeys((PlaneFeature, *ROUND, SphereFeature), AssociatedSurface),
-    limits_wall=True,
-)
+Zones = Mapping[type[FeatureGeometry], Zone]  # of the kinds of features that may have a tolerance
+LOCATION: Zones = dict.fromkeys((*FLAT, SphereFeature), surface_zone) | dict.fromkeys(ROUND, axis_zone)
+ORIENTATION: Zones = dict.fromkeys(FLAT, slope_zone) | dict.fromkeys(ROUND, direction_zone)
+RUNOUT: Zones = dict.fromkeys(FLAT, slope_zone) | dict.fromkeys(ROUND, axis_zone)
+PROFILE: Zones = dict.fromkeys((*FLAT, *ROUND, SphereFeature, GeneralFeature), surface_zone)
 
-TOLERANCES: dict[ToleranceKind, ToleranceRow] = {
+ZONES: dict[ToleranceKind, Zones] = {
     declared.Position: LOCATION,
-    declared.Coaxiality: ToleranceRow(dict.fromkeys(ROUND, axis_zone) | {SphereFeature: surface_zone}),
-    declared.Symmetry: ToleranceRow({SlabFeature: surface_zone} | dict.fromkeys(ROUND, flat_axis_zone)),
+    declared.Coaxiality: dict.fromkeys(ROUND, axis_zone) | {SphereFeature: surface_zone},
+    declared.Symmetry: {SlabFeature: surface_zone} | dict.fromkeys(ROUND, flat_axis_zone),
     declared.Profile: PROFILE,
     declared.LineProfile: PROFILE,
     declared.Parallelism: ORIENTATION,
@@ -154,18 +132,26 @@ TOLERANCES: dict[ToleranceKind, ToleranceRow] = {
     declared.Angularity: ORIENTATION,
     declared.CircularRunout: RUNOUT,
     declared.TotalRunout: RUNOUT,
-    declared.Straightness: ToleranceRow(dict.fromkeys((*FLAT, *ROUND), form_zone), dict.fromkeys(ROUND, AssociatedLines)),
-    declared.Flatness: ToleranceRow(dict.fromkeys(FLAT, form_zone), {PlaneFeature: AssociatedSurface}),
-    declared.Roundness: ToleranceRow(
-        dict.fromkeys((*ROUND, SphereFeature), form_zone), dict.fromkeys(ROUND, AssociatedCircles)
-    ),
-    declared.Cylindricity: ToleranceRow({CylinderFeature: form_zone}, {CylinderFeature: AssociatedSurface}),
+    declared.Straightness: dict.fromkeys((*FLAT, *ROUND), form_zone),
+    declared.Flatness: dict.fromkeys(FLAT, form_zone),
+    declared.Roundness: dict.fromkeys((*ROUND, SphereFeature), form_zone),
+    declared.Cylindricity: {CylinderFeature: form_zone},
+}
+PROFILE_FORMS = dict.fromkeys((PlaneFeature, *ROUND, SphereFeature), AssociatedSurface)
+# What form deviations are measured from, for the kinds of features whose form a tolerance draws.
+FORMS: dict[ToleranceKind, Mapping[type[FeatureGeometry], type[AssociatedSurface]]] = {
+    declared.Profile: PROFILE_FORMS,
+    declared.LineProfile: PROFILE_FORMS,
+    declared.Straightness: dict.fromkeys(ROUND, AssociatedLines),
+    declared.Flatness: {PlaneFeature: AssociatedSurface},
+    declared.Roundness: dict.fromkeys(ROUND, AssociatedCircles),
+    declared.Cylindricity: {CylinderFeature: AssociatedSurface},
 }
 
 
 def zone_rows(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> np.ndarray:
     """Return the rows of the zone of a tolerance. Raises GeometryFault if the feature cannot have the tolerance."""
-    zones = TOLERANCES[tolerance.of].zones
+    zones = ZONES[tolerance.of]
     if type(feature) not in zones:
         *plurals, last = (kind.plural for kind in zones)
         kinds = f"{', '.join(plurals)} and {last}" if plurals else last
@@ -178,14 +164,14 @@ def zone_rows(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: 
 
 def includes_form(tolerance: GeometricTolerance, feature: FeatureGeometry) -> bool:
     """Return whether a zone contains the surface with its form: not the axis or the tangent plane alone."""
-    return not tolerance.tangent and (isinstance(feature, PlaneFeature) or TOLERANCES[tolerance.of].limits_wall)
+    return not tolerance.tangent and (isinstance(feature, PlaneFeature) or tolerance.of.limits_wall)
 
 
 def floats(tolerance: GeometricTolerance, feature: FeatureGeometry, rows: np.ndarray) -> bool:
     """Return whether a zone with these rows may lie anywhere along the normals of the surface, a round one with any radius."""
     if isinstance(feature, PlaneFeature):
         return not rows[..., 0].any()  # it limits tilts alone, and not the offset, the first coordinate of a plane
-    return TOLERANCES[tolerance.of].has_any_radius
+    return tolerance.of.has_any_size
 
 
 def is_drawn(kind: ToleranceKind, per: object) -> bool:
@@ -193,7 +179,7 @@ def is_drawn(kind: ToleranceKind, per: object) -> bool:
 
     A roundness may limit part of a circle, a straightness an axis: what is drawn of these are circles and lines.
     """
-    return per is None and all(associated.is_whole for associated in TOLERANCES[kind].forms.values())
+    return per is None and all(associated.is_whole for associated in FORMS[kind].values())
 
 
 def form_tolerance(toleranced: Toleranced, feature: FeatureGeometry) -> GeometricTolerance | None:
@@ -208,7 +194,7 @@ def form_tolerance(toleranced: Toleranced, feature: FeatureGeometry) -> Geometri
         and (tolerance.is_form or (tolerance.limits_form_alone and not toleranced.combines(tolerance)))
     ]  # fmt: skip
     for tolerance in tolerances:
-        if tolerance.per is not None or type(feature) not in TOLERANCES[tolerance.of].forms:
+        if tolerance.per is not None or type(feature) not in FORMS[tolerance.of]:
             unit = " per unit" if tolerance.per is not None else ""
             raise GeometryFault(
                 f"the form of {tolerance.kind}{unit} of {feature.in_words} cannot be drawn; give the {tolerance.kind} "
@@ -226,7 +212,7 @@ def form_field_of(tolerance: GeometricTolerance, feature: FeatureGeometry, face:
     surface = analytic_surface(face)
     if tolerance.form is None or surface is None:
         return None
-    associated = TOLERANCES[tolerance.of].forms[type(feature)].of(surface, face)
+    associated = FORMS[tolerance.of][type(feature)].of(surface, face)
     if tolerance.form.measured is not None:
         return measured_field(tolerance.form, tolerance.form.measured, face, associated)
     return form_field(tolerance.form, face, associated)

@@ -1,14 +1,17 @@
-"""Layers: the directions of a feature that each of its tolerances controls, from the innermost tolerance on."""
+"""Layers: the directions of a feature that each of its tolerances controls, from the innermost tolerance on; play of datums."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy
 
-from tolcontact.declaration import GeometricTolerance
-from tolcontact.declaration.feature_tolerance import TRANSLATION
+from tolcontact.declaration import Feature, GeometricTolerance
+from tolcontact.declaration.feature_tolerance import INSIDE, TRANSLATION, Material, Position
 from tolcontact.errors import GeometryFault
 from tolcontact.features.datum_frames import RANK_TOLERANCE, DatumFrame, datum_frame
+from tolcontact.features.feature_geometry import FeatureOfSize
+from tolcontact.features.freedoms import FEATURE, Freedom
 from tolcontact.features.nominal_feature import NominalFeature
 from tolcontact.features.nominal_pattern import MIN_LENGTH, Layer, NominalPattern
 from tolcontact.features.tolerance_kinds import zone_rows
@@ -66,6 +69,39 @@ def _zone(
     return rows, frame, controlled
 
 
+def mobile(pattern: NominalPattern, free: np.ndarray, material: Material, start: int, label: str) -> NominalPattern:
+    """Return a datum feature with the freedoms of its gauge element, from column `start` on; without any if it has no play.
+
+    The frame of the gauge may be displaced from the datum feature, in the directions that this datum locks, by what the feature
+    departs from its boundary: a zone of the width of its own tolerances to the datums before, plus the departure of its size.
+    This holds where no mate is modelled; contact decides where one is.
+
+    free      (6, n): displacements about its centre that the datums before it leave free
+    material  "M" or "L"
+    label     of the freedoms, which their directions follow
+    """
+    declared, member = pattern.declared, pattern.members[0]
+    added, layers = np.zeros((pattern.count, 0)), tuple[Layer, ...]()
+    if isinstance(declared, Feature) and isinstance(member.geometry, FeatureOfSize) and member.size_column is not None:
+        own = min(
+            (tolerance.width for tolerance in declared.geometric if not tolerance.is_form and tolerance.datums), default=0.0
+        )
+        zone = GeometricTolerance(Position, own, material=material, rule=INSIDE)
+        rows, added = (
+            zone_rows(zone, member.geometry, None),
+            _named_basis(_span(pattern.values @ free), pattern, is_outer=False),
+        )
+        frame = DatumFrame(np.zeros((6, start)), free, ())
+        layers = (Layer(zone, (rows,), added, added, range(start, start + added.shape[1]), frame),)
+    motion = np.zeros((pattern.count, start + added.shape[1]))
+    motion[:, start:] = added
+    freedoms = tuple(
+        Freedom(f"{label}: {pattern.freedom_name(direction)}", FEATURE, geometric=layer.tolerance)
+        for layer in layers for direction in added.T
+    )  # fmt: skip
+    return replace(pattern, members=(replace(member, mobility=motion),), layers=layers, freedoms=freedoms, shifts=(), form=None)
+
+
 def uncontrolled(pattern: NominalPattern, followed: np.ndarray) -> list[str]:
     """Return the names of the freedoms of a pattern that no tolerance limits.
 
@@ -121,11 +157,6 @@ def _span(vectors: np.ndarray) -> np.ndarray:
 def _difference(basis: np.ndarray, subtracted: np.ndarray) -> np.ndarray:
     """Return a basis of the part of a span that is orthogonal to another span; both are given by orthonormal columns."""
     return _span(basis - subtracted @ (subtracted.T @ basis))
-
-
-def named_span(vectors: np.ndarray, pattern: NominalPattern) -> np.ndarray:
-    """Return unit vectors with the span of columns (coordinate, n), along coordinates where the span has any."""
-    return _named_basis(_span(vectors), pattern, is_outer=False)
 
 
 def _named_basis(directions: np.ndarray, pattern: NominalPattern, *, is_outer: bool) -> np.ndarray:

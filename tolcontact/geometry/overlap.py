@@ -3,7 +3,7 @@
 import numpy as np
 
 from tolcontact.geometry.surface import Surface
-from tolcontact.geometry.triangle_mesh import edges, rim
+from tolcontact.geometry.triangle_mesh import edges
 
 MAX_EDGES = 2000  # of a rim; above this its corners are so dense that evenly spread points suffice
 MIN_ANGLE = np.radians(1.0)  # between edges that cross
@@ -16,19 +16,18 @@ def overlap_corners(face: Surface, target: Surface) -> np.ndarray:
 
     Corners of the face's own rim are not included.
     """
-    face_rim, target_rim = (rim(np.asarray(surface.mesh.faces)) for surface in (face, target))
-    if not _are_few(face_rim, target_rim):
+    edges_p, edges_q = face.rim_ends, target.rim_ends
+    if not _are_few(edges_p, edges_q):
         return np.zeros((0, 3))
     n = mean_normal(target)
-    edges_p, edges_q = np.asarray(face.mesh.vertices)[face_rim], np.asarray(target.mesh.vertices)[target_rim]
     row, _, share = _crossings(edges_p, edges_q, n)
     crossings = edges_p[row, 0] + share[:, None] * (edges_p[row, 1] - edges_p[row, 0])
     # Corners of the target's rim, projected along its normal onto this face.
     normal = face.corner_normals.reshape(-1, 3).mean(axis=0)
-    corners = np.asarray(target.mesh.vertices)[np.unique(target_rim)]
+    corners = target.rim_corners
     if abs(n @ normal) < MIN_ANGLE:
         return crossings
-    height = (np.asarray(face.mesh.vertices)[0] - corners) @ normal / (n @ normal)
+    height = (face.vertices[0] - corners) @ normal / (n @ normal)
     below = corners + height[:, None] * n
     _, _, is_over = face.project(below)
     return np.concatenate([crossings, below[is_over]])
@@ -36,9 +35,8 @@ def overlap_corners(face: Surface, target: Surface) -> np.ndarray:
 
 def crossing_edges(face: Surface, target: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Return edges (crossing, end, 3) [mm] of the rim of a face, and the edges of the target's rim that cross them."""
-    face_rim, target_rim = (rim(np.asarray(surface.mesh.faces)) for surface in (face, target))
-    edges_p, edges_q = np.asarray(face.mesh.vertices)[face_rim], np.asarray(target.mesh.vertices)[target_rim]
-    if not _are_few(face_rim, target_rim):
+    edges_p, edges_q = face.rim_ends, target.rim_ends
+    if not _are_few(edges_p, edges_q):
         return edges_p[:0], edges_q[:0]
     row, column, _ = _crossings(edges_p, edges_q, mean_normal(target))
     return edges_p[row], edges_q[column]
@@ -104,6 +102,6 @@ def rim_points(face: Surface, target: Surface, step: float, within: float) -> np
 
 def points_on_rim(face: Surface, step: float) -> np.ndarray:
     """Return points (point, 3) [mm] along the rim of a face, at most `step` [mm] apart, including its triangles' corners."""
-    starts, ends = np.asarray(face.mesh.vertices)[rim(np.asarray(face.mesh.faces))].swapaxes(0, 1)
+    starts, ends = face.rim_ends.swapaxes(0, 1)
     pieces = np.maximum(np.ceil(np.linalg.norm(ends - starts, axis=1) / step), 1).astype(int)
     return np.concatenate([np.linspace(a, b, count, endpoint=False) for a, b, count in zip(starts, ends, pieces, strict=True)])

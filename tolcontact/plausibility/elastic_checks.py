@@ -1,4 +1,4 @@
-"""Checks of elastic parts under load, with figures: laws of linear elasticity, and what a finer mesh changes."""
+"""Checks of elastic parts: bending beyond the theory, and under load, with figures, laws of elasticity and finer meshes."""
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -16,7 +16,7 @@ from tolcontact.errors import GeometryFault, NominalWarning
 from tolcontact.mechanics.flexibility import Bodies, PartFlexibility, elastic_bodies, part_flexibilities
 from tolcontact.plausibility.trial_draws import TrialDraws, spread
 from tolcontact.simulation import Block, simulate_block
-from tolcontact.vocabulary import CERTIFIED, CORRECTED
+from tolcontact.vocabulary import CERTIFIED, CORRECTED, Status
 
 DRAWS = 8  # under load, and the nominal assembly
 MAX_COLUMNS = 32  # unit loads of which reciprocity is tested
@@ -27,6 +27,29 @@ MAX_NODES = 40_000  # of the finer mesh, so that a check takes a minute at most
 ORDER = 2  # of convergence: displacements of quadratic tetrahedra converge with order 2 to 4
 MAX_SHARE = 0.05  # of a tolerance, or of 6 sigma: the uncertainty of a measurement by the mesh
 MAX_LISTED = 12
+MAX_BENDING = 0.1  # of the size of a part: the stiffness of a part that bends further is not that of its undeformed shape
+
+
+def large_bending(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each elastic part that bends too far in the nominal assembly for a theory of small displacements."""
+    bending, parts = draws.program.bending, draws.program.nominal.parts
+    for index, bent in bending.parts.items() if bending else ():
+        bend, size = bent.largest_displacement(draws.nominally_resolved.load[0]), float(parts[index].mesh.scale)
+        if bend > MAX_BENDING * size:
+            yield (
+                f"{parts[index].part.designation}: it bends by {bend:.3g} mm in the nominal assembly, and is {size:.3g} mm "
+                "large, beyond a theory of small displacements; check its forces, its supports, and its modulus or "
+                "the units of its stiffness"
+            )
+
+
+def unresolved_nominal(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence if contact of elastic parts is not resolved in the nominal assembly."""
+    if draws.program.bending and (status := Status(draws.nominally_resolved.status[0])) not in CERTIFIED:
+        yield (
+            f"the nominal assembly, which has elastic parts, is {status.name.lower()}; check that locators and contact hold "
+            "each part against its forces, and that stops leave a place for it"
+        )
 
 
 @dataclass(frozen=True, eq=False)

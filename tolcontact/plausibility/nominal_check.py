@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator
 
 from tolcontact.compilation import Program
 from tolcontact.errors import NominalWarning
-from tolcontact.plausibility.bending import large_bending, unresolved_nominal
 from tolcontact.plausibility.bodies import body_overlaps, clashes, clashes_beyond_faces
 from tolcontact.plausibility.declared_points import doubtful_units, far_points, stored_coordinates, unfit_directions
 from tolcontact.plausibility.effects import unfollowed_by_locators, unfollowed_by_measures, unused_features, unvaried
+from tolcontact.plausibility.elastic_checks import large_bending, unresolved_nominal
 from tolcontact.plausibility.faces import measured_forms, partial_surfaces
 from tolcontact.plausibility.measures import assumed_sides, measure_limits, measured_reach, rotations, wide_tolerances
 from tolcontact.plausibility.pairs import (

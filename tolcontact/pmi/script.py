@@ -65,7 +65,8 @@ def _arguments(declared: Feature | Pattern) -> list[str]:
         arguments += map(_face, declared.faces)
     else:
         for member in declared.constituents:
-            arguments.append(_identifier(member.name) if isinstance(member, Feature) else _member(member))
+            faces = [_identifier(member.name)] if isinstance(member, Feature) else [*map(_face, member)]
+            arguments.append(faces[0] if len(faces) == 1 else f"({', '.join(faces)})")
     arguments += map(_source, declared.tolerances)
     return arguments + ([] if declared.datum is None else [f"datum={literal(declared.datum)}"])
 
@@ -86,11 +87,6 @@ def _lines(beginning: str, arguments: Sequence[str]) -> Iterator[str]:
 
 def _identifier(name: str) -> str:
     return re.sub(r"\W", "_", f"feature_{name}" if len(name) < 3 else name)
-
-
-def _member(faces: Sequence[Face]) -> str:
-    """Return a member of a pattern: a face, or two in parentheses."""
-    return _face(faces[0]) if len(faces) == 1 else f"({', '.join(map(_face, faces))})"
 
 
 def _face(face: Face) -> str:

@@ -1,6 +1,5 @@
 """Annotations of an assembly in its nominal frame [mm]: locators, contact points, measures, features and forces."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +13,7 @@ from tolcontact.declaration import Point
 from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.errors import ArchiveError
 from tolcontact.geometry.shapes import reflected
+from tolcontact.realizations import declaration_of
 
 Mark = dict[str, Any]
 
@@ -38,7 +38,7 @@ class Marks:
 
 def marks_of(results: xr.DataTree) -> Marks:
     """Return the annotations that an archive has."""
-    document = json.loads(str(results["model"][terms.DECLARATION.name].values))
+    document = declaration_of(results)
     try:
         forces = [
             {"name": force["name"], "at": _at(document, force["at"]), "along": force["vector"]} for force in document["forces"]

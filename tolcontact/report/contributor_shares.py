@@ -1,6 +1,5 @@
 """The contributors of each measurement, from the draws of the run itself: linear shares of variance, with contact."""
 
-import json
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -9,6 +8,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.errors import TolcontactError
+from tolcontact.realizations import declaration_of
 from tolcontact.report.figures import NO_INTERVAL, grouped, percent
 from tolcontact.statistics.linear_shares import (
     MIN_EFFECTIVE,
@@ -50,7 +50,7 @@ def shares_or_first_order(
     It returns the variance (measure, contributor) that each contributor causes to first order, without contact. These add up
     for independent contributors, so there are none with correlations or populations.
     """
-    estimated, document = contributor_shares(results, realizations), json.loads(_declaration(results))
+    estimated, document = contributor_shares(results, realizations), declaration_of(results)
     is_joint = document.get("correlations") or document.get("populations")
     if variances is None or is_joint or not any(shares.is_open for shares in estimated):
         return estimated
@@ -124,10 +124,6 @@ def _without(note: str, *, is_open: bool = False) -> ContributorShares:
     return ContributorShares([], np.zeros((0, len(terms.ESTIMATE))), note, is_open=is_open)
 
 
-def _declaration(results: xr.DataTree) -> str:
-    return str(results["model"][terms.DECLARATION.name].values)
-
-
 def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> dict[str, np.ndarray]:
     """Return the positions in `columns` of each group, by name."""
     labels = [str(label) for label in sample[terms.CONTRIBUTOR].values]
@@ -148,7 +144,7 @@ def _owner(label: str, source: str) -> str:
 
 def _drawn_together(results: xr.DataTree) -> Iterator[list[str]]:
     """Yield labels of contributors that the model declares to depend on each other."""
-    document = json.loads(_declaration(results))
+    document = declaration_of(results)
     for correlation in document.get("correlations", []):
         yield list(correlation["labels"])
     for variable in document.get("variables", []):

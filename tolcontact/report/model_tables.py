@@ -1,6 +1,5 @@
 """A declared model as its archive holds it: tables of parts, features, locators, pairs and measurements; settings."""
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -12,6 +11,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.declaration import Chain, Tolerance, Variable
 from tolcontact.declaration.document import tolerance_of_entry, variable_of_entry
 from tolcontact.errors import ArchiveError
+from tolcontact.realizations import declaration_of
 from tolcontact.report.figures import nominal_and_limits, plain
 from tolcontact.report.table import Cell, Table
 
@@ -33,11 +33,6 @@ def model_tables(results: xr.DataTree) -> list[Table]:
     except (LookupError, TypeError, ValueError) as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {type(error).__name__}: {error}") from error
     return [table.without_empty_columns() for table in tables if table.rows]
-
-
-def declaration_of(results: xr.DataTree) -> Entry:
-    """Return the declared model of an archive, as its document."""
-    return dict(json.loads(str(results["model"][terms.DECLARATION.name].values)))
 
 
 def dimensions_of(document: Entry) -> list[Variable]:

@@ -20,7 +20,6 @@ drawn first, the weights of lots are drawn, too, and the parts not measured are 
 The spread over the worlds adds to the interval of the run like an independent error, on the log scale for spreads.
 """
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import compress
@@ -32,6 +31,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.declaration import Population
+from tolcontact.realizations import declaration_of
 from tolcontact.statistics.intervals import CONFIDENCE
 from tolcontact.statistics.linear_shares import required_realizations
 
@@ -167,7 +167,7 @@ class Index(NamedTuple):
 
 def worlds_of(results: xr.DataTree, count: int) -> Worlds | None:
     """Return the posterior draws for `count` realizations; None if nothing was measured, or no deviations are kept."""
-    sample, document = results["sample"].to_dataset(), json.loads(str(results["model"][terms.DECLARATION.name].values))
+    sample, document = results["sample"].to_dataset(), declaration_of(results)
     populations = document.get("populations", [])
     parts = sample[terms.PARTS.name].values if terms.PARTS.name in sample else np.zeros(sample.sizes[terms.CONTRIBUTOR], int)
     if not (parts.any() or populations) or terms.DEVIATION.name not in sample:

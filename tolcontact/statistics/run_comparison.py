@@ -1,7 +1,6 @@
 """Comparison of runs: the statistics of their common measures, and the changes from the first run."""
 
 import itertools
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,7 +10,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
-from tolcontact.realizations import assembled, is_assembled, pieces, statuses
+from tolcontact.realizations import assembled, declaration_of, is_assembled, pieces, statuses
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
@@ -121,8 +120,7 @@ def _draws(run: xr.DataTree, reference: xr.DataTree, count: int) -> str:
 
 def _drawn_declaration(run: xr.DataTree) -> dict[str, Any]:
     """Return the declaration without the method, which does not affect the draws."""
-    declaration = json.loads(str(run["model"][terms.DECLARATION.name].values))
-    return {key: value for key, value in declaration.items() if key != "method"}
+    return {key: value for key, value in declaration_of(run).items() if key != "method"}
 
 
 def _changes(

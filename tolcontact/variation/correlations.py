@@ -12,7 +12,7 @@ import scipy
 from scipy.special import ndtr
 
 from tolcontact.declaration import Correlation
-from tolcontact.errors import ModelError, designation
+from tolcontact.errors import ModelError
 from tolcontact.features.freedoms import Freedom
 
 MAX_SCORE, SCORES, TERMS = 8.0, 8001, 80
@@ -68,7 +68,7 @@ def copula_matrix(correlation: Correlation, freedoms: Sequence[Freedom], model: 
     if not faults and np.linalg.eigvalsh(matrix).min() < MIN_EIGENVALUE:
         faults.append(f"no Gaussian copula has these {correlation.kind} coefficients together; make them smaller")
     if faults:
-        raise ModelError(model, [f"{designation('correlation', correlation)}: {fault}" for fault in faults])
+        raise ModelError(model, [f"{correlation.designation}: {fault}" for fault in faults])
     return matrix
 
 

@@ -14,7 +14,7 @@ from tolcontact.declaration import GeometricTolerance
 from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
 from tolcontact.declaration.tolerance import SIDES
 from tolcontact.discretization import Nominal
-from tolcontact.errors import GeometryFault, ModelError, designation
+from tolcontact.errors import GeometryFault, ModelError
 from tolcontact.features import FeatureOfSize, FormField, Freedom, Layer, NominalPattern, minimum_zone, zone_kernel
 from tolcontact.features.freedoms import lot_score
 from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
@@ -182,8 +182,7 @@ def fill_zones(nominal: Nominal) -> tuple[list[Freedom], list[ComponentZone], di
         try:
             component_zones += _fill_layers(pattern, spreads_of_forms, freedoms)
         except GeometryFault as fault:
-            declared = pattern.declared
-            place = f'part "{declared.part.name}": {designation(declared.noun, declared)}'
+            place = f'part "{pattern.declared.part.name}": {pattern.declared.designation}'
             raise ModelError(nominal.assembly.name, [f"{place}: {fault}"]) from fault
     return freedoms, component_zones, mean_widths
 

@@ -17,10 +17,9 @@ from tolcontact.declaration import Assembly, Chain, TitleBlock
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
-from tolcontact.realizations import finished
+from tolcontact.realizations import archived_analysis, declaration_of, finished
 from tolcontact.replacing import replacing
 from tolcontact.report.analysis_tables import analysis_report
-from tolcontact.report.archived_analysis import archived_analysis
 from tolcontact.report.comparison_text import change_table, contributor_table, runs_lines, value_table
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares, shares_or_first_order
 from tolcontact.report.convention_text import offset_table
@@ -30,7 +29,7 @@ from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, r
 from tolcontact.report.html.loop import loops_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.model_changes import model_changes
-from tolcontact.report.model_tables import archived_settings, chains_of, declaration_of, dimensions_of, model_tables
+from tolcontact.report.model_tables import archived_settings, chains_of, dimensions_of, model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
 from tolcontact.report.summary_text import contact_lines, measure_table, pair_table
 from tolcontact.statistics.capability import VERDICT_RULE

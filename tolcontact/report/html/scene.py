@@ -20,9 +20,8 @@ from tolcontact.discretization import Nominal
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry import PartPreview, preview
 from tolcontact.geometry.faces import Meshes, triangles
-from tolcontact.realizations import finished
+from tolcontact.realizations import archived_analysis, finished
 from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
-from tolcontact.report.archived_analysis import archived_analysis
 from tolcontact.report.elastic_tables import reactions_of
 from tolcontact.report.html.form_scene import MAX_GAPS, SingleStates
 from tolcontact.report.html.station_scenes import station_poses, stations_of, stations_of_nominal, worst_poses
