@@ -85,7 +85,7 @@ def model_scene(name: str) -> Scene:
     """Return a model whose faces do not deviate."""
     assembly = frames.model(name)
     nominal = tc.build(assembly, solver="daqp", method=tc.Method()).nominal
-    sides = {tuple(nominal.part_index(face.part) for face in (pair.moving, pair.reference)) for pair in assembly.pairs}
+    sides = {(nominal.part_index(pair.moving.part), nominal.part_index(pair.reference.part)) for pair in assembly.pairs}
     meshes = [part.mesh.copy().apply_transform(homogeneous(*part.placement)) for part in nominal.parts]
     return Scene(assembly, [convex_pieces(mesh) for mesh in meshes], sorted(sides), assembly.smallest_zone())
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import clarabel
 import numpy as np
+import scipy
 from scipy import sparse
-from scipy.optimize import linprog
 
 from tolcontact.arrays import Array, Float
 
@@ -60,7 +60,7 @@ class ForceCones:
     def can_carry(self, point: int) -> bool:
         """Return whether a point carries in any balance of the load without friction."""
         cost = -np.eye(1, len(self.roughness), point)[0]
-        found = linprog(cost, A_eq=self.normals, b_eq=-self.load, bounds=(0, MAX_CARRIED))
+        found = scipy.optimize.linprog(cost, A_eq=self.normals, b_eq=-self.load, bounds=(0, MAX_CARRIED))
         return bool(found.status == 0 and -found.fun > MIN_HELD)
 
     def _balanced(self, factor: float) -> tuple[float, np.ndarray]:

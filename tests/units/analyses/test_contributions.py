@@ -5,7 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER
+from tests.helpers import PAPER, compiled
 from tests.test_contributions import of_normal
 from tolcontact.analyses.analysis import independent_groups
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
