@@ -62,7 +62,7 @@ Every example in the guide is run by the tests.
 | errors and warnings | `TolcontactError` and its kinds `ModelError` and `OptionError`; `NominalWarning` |
 | choose faces, `tc.select` | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | analyse, `tc.analyses` | `stack_up`, `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, |
-| | `seating`, `sweep` |
+| | `seating`, `sweep`, `Stopped` |
 | read and write files, `tc.io` | `bodies_in`, `faces_in`, `parts_from`, `read_pmi`, `features_from_pmi`, `measured_planes`, |
 | | `write_model`, `model_of` |
 | test your models, `tc.testing` | `assert_resolved`, `assert_no_clashes`, `assert_gaps_recompute`, |

@@ -221,14 +221,16 @@ def contact_lines(summary: xr.Dataset, count: int, *, is_long: bool = False) -> 
     yield from _clashes(summary, count, is_long=is_long)
     raw, corrected = (settled(float(summary["penetration"].sel(state=state))) for state in (RAW, CORRECTED))
     median, largest = summary["iterations"].values
+    steps = (
+        f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" and not is_long else ""
+    )
+    yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
     if is_long:
         yield from (line for line in (*_between(summary, count), *_advice(summary, corrected)) if not line.startswith(DEEPEST))
         yield from offset_lines(summary)
         if len(lines := [*convention_lines(summary)]) > 3:  # results depend on it
             yield from lines
         return
-    steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
-    yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
     yield from convention_lines(summary)
     yield from offset_lines(summary)
     if shifted := summary.attrs["datum_shifts"]:
