@@ -54,11 +54,11 @@ def test_of_whole_bodies_with_coinciding_corners(family):
             continue
         size = min(placed.ranges)
         for meeting in program.meetings.values():
-            X = poses(rng, 60, size / 4, 0.005)
+            X = poses(rng, 30, size / 4, 0.005)
             X = X[meeting.covers(X)]
             if len(X):
                 found += assert_same_places(meeting, X) > len(X) // 2
-        if found >= 3:
+        if found:
             break
     assert found
 
