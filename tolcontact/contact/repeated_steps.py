@@ -62,11 +62,14 @@ WHERE_FACES_END = (
     Phase(50, newton=True, width=WIDE),
 )
 OF_FREE_BODIES = Phase(60), Phase(30, newton=True)
+FROM_ANSWERS = (Phase(12, sharp=True),)  # which stay if these steps do not converge
 
 
 def _schedule(candidates: Candidates, start: Start) -> Sequence[Phase]:
     if start.free:
         return OF_FREE_BODIES
+    if start.sloped:
+        return FROM_ANSWERS
     return WHERE_FACES_END if candidates.bounded else WITH_FORM if candidates.change else USUAL
 
 
