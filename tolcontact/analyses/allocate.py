@@ -88,11 +88,9 @@ def allocate(
     return analysis.finest(_answers(search, groups, ranges, by))
 
 
-Groups = Mapping[str, np.ndarray]
-Answers = Iterator[Callable[[], Answer]]
-
-
-def _answers(search: "Search", groups: Groups, ranges: Sequence[float], by: str) -> Answers:
+def _answers(
+    search: "Search", groups: Mapping[str, np.ndarray], ranges: Sequence[float], by: str
+) -> Iterator[Callable[[], Answer]]:
     """Yield present ranges, those of the search as they change, and the allocated ones."""
     trials, requirements = search.trials, search.trials.requirements
     samples, count = trials.samples, len(trials.engine.program.nominal.measures)

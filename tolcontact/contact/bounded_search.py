@@ -35,11 +35,10 @@ class BoundedSearch(FixedSearch):
     free_depth   [mm]: the largest penetration of free bodies
     """
 
-    clusters = 1  # places are found at every pose, so that clusters offer no separate points
-
     def __init__(self, program: Program, index: int, tables: Sequence[np.ndarray] = ()) -> None:
         super().__init__(program, index, tables)
-        self.clusters, self.is_closed, self.is_curved = 1, True, False
+        self.clusters = 1  # places are found at every pose, so that clusters offer no separate points
+        self.is_closed, self.is_curved = True, False
         self.meeting, self.adds_guard = program.meetings[index], False
         self.edge_error, self.free_depth = EDGE_SHARE * self._smallest, FREE_SHARE * self._smallest
 

@@ -123,7 +123,7 @@ class Candidates:
             labels = state.slots[self._varying.index(k)].labels[row, slot]
             slants = pair.meeting.slants(state.relative[row, k], labels)
             total += np.bincount(row, slants * state.multipliers[:, self._spans[k]][row, slot], minlength=len(state))
-        return total / np.maximum(state.multipliers.sum(axis=1), TINY)
+        return total / np.maximum(np.abs(state.multipliers).sum(axis=1), TINY)
 
     @property
     def are_guarded(self) -> bool:

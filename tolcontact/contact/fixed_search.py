@@ -66,8 +66,6 @@ class FixedSearch:
     is_closed   whether the set of points that may be active is closed, see Method
     """
 
-    clusters = MAX_CLUSTERS
-
     def __init__(self, program: Program, index: int, tables: Sequence[np.ndarray] = ()) -> None:
         self.program, self.index, self.pair = program, index, program.nominal.pairs[index]
         self._tables, self._smallest = tables, program.nominal.assembly.smallest_zone()
@@ -75,8 +73,7 @@ class FixedSearch:
         self.has_minima = is_exact and self.is_closed and bool(np.isfinite(self._smallest)) and self.pair.minima is not None
         self.is_curved = is_exact and self.pair.curvature > 0
         self._bulge = max(BULGE_SHARE * self._smallest, MIN_BULGE)
-        if self.pair.has_form:
-            self.clusters = FORM_CLUSTERS
+        self.clusters = FORM_CLUSTERS if self.pair.has_form else MAX_CLUSTERS
 
     # Of all contact points, at any poses.
 

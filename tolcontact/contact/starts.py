@@ -47,7 +47,7 @@ class Rescue(NamedTuple):
     rows      the realizations: "apart", whose raw bodies are apart although gaps deny it; "no answer"; "interfere", with bodies
               that interfere in their answer; "uncertain", not certified; "uncertain or far", these and certified ones far from
               their raw pose; "not separated", without an answer, or with bodies that interfere in it; "slanted", certified ones
-              that rims carry where the slope of their gap differs from the normal of the plane
+              with rims under load where the slope of their gap differs from the normal of the plane
     surfaces  which pairs the group must have: "any", "curved" faces or only "flat" ones, no pair of bounded faces whose bodies
               are not tested for interference ("guarded"), or convex bodies that are parted in one direction ("convex")
     starts    one after the other, until the answer is certified, or two of them end in the same conflict

@@ -26,7 +26,7 @@ MAX_TILT_SINE = 0.2  # largest sine of the tilt of a normal out of the cone of a
 MIN_CROSSING = 1e-3  # rad: edges of facing planes that cross at a smaller angle meet at their corners
 IN_PLANE = 1e-6  # sine of the largest angle between a plane and its edges
 PARALLEL = 1e-6  # rad: edges at a smaller angle have no common normal
-MAX_SLANT = 1.5  # length up to which the slope of a gap between rims counts; beyond, they are nearly parallel
+MAX_SLOPE = 1.5  # length up to which the slope of a gap between rims counts; beyond, they are nearly parallel
 INSIDE = 1e-9  # mm: contact points that are no deeper count as touching
 TINY = 1e-300
 ORIGIN = (0.0, 0.0, 0.0)
@@ -165,5 +165,5 @@ def edge_on_edge(A, B, index_A, index_B, flat, plane, spare, reach, X, x, d):  #
             and is_inside(A.triangles, _inner(under, u, back, up, height, A.edge_normals, index_A))
         ):
             return NOWHERE
-    is_slanted = plane >= 0 and reach[3] * abs(crossing) < length < MAX_SLANT * abs(crossing)
+    is_slanted = plane >= 0 and reach[3] * abs(crossing) < length < MAX_SLOPE * abs(crossing)
     return height, move_back(X, y), projection, scaled(1 / crossing, c) if is_slanted else m

@@ -40,7 +40,7 @@ DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 ARC = np.linspace(0, 1, 17)  # shares at which the normals between two facets are compared
 ARC_SPACING = np.pi / 16  # rad: the largest angle between two of them
-MIN_SLANT = 1.02  # lengths of slopes that always count
+MIN_SLOPE = 1.02  # length from which the slope of a gap between rims counts, if nothing else is asked for
 BLOCK_ARCS = 4096  # pairs of edges whose arcs are compared in one block
 
 
@@ -87,7 +87,7 @@ class Meeting:
     overhang [mm]: largest distance outside its edges at which a contact point counts
     has_form whether faces have form, so that planes may touch first at any of their corners
     is_free  whether bodies are free, so that no contact point is behind another one
-    slant    length from which the slope of a gap between rims counts, and not the normal of the plane, whose length is 1
+    slope    length from which the slope of a gap between rims counts, and not the normal of the plane, whose length is 1
     """
 
     moving: Polyhedron
@@ -98,7 +98,7 @@ class Meeting:
     has_form: bool = field(kw_only=True)
     overhang: float = field(default=0.0, kw_only=True)
     is_free: bool = field(default=False, kw_only=True)
-    slant: float = field(default=MIN_SLANT, kw_only=True)
+    slope: float = field(default=MIN_SLOPE, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.candidates.kinds)
@@ -110,12 +110,13 @@ class Meeting:
     @cached_property
     def sloped(self) -> "Meeting":
         """The same candidates; those where rims of facing planes cross have the slope of their gap as normals."""
-        return replace(self, slant=1.0)
+        return replace(self, slope=1.0)
 
     def slants(self, X_RM: Float[Array, "n 12"], labels: Int[Array, " n"]) -> Float[Array, " n"]:
         """Return the tangents of the angles between slopes of gaps and the normals that rows have instead, at poses (n, 12).
 
-        This is 0 but for candidates where rims of facing planes cross, and there if the slope counts already.
+        This is 0 but for candidates where rims of facing planes cross. It is 0 there, too, if the slope counts already, and for
+        candidates of extended meetings.
         """
         found, candidates = np.zeros(len(labels)), self.candidates
         rows = np.flatnonzero((labels >= 0) & (labels < len(self)))
@@ -129,7 +130,7 @@ class Meeting:
         c = np.cross(d, e)
         across = np.abs((c * n).sum(axis=1))
         slant = np.linalg.norm(np.cross(c, n), axis=1) / np.maximum(across, kernel.TINY)
-        found[rows] = np.where(1 + slant**2 < self.slant**2, slant, 0.0)
+        found[rows] = np.where(1 + slant**2 < self.slope**2, slant, 0.0)
         return found
 
     @property
@@ -146,7 +147,7 @@ class Meeting:
         travel, tilt = EXTENSION_FACTOR * self.reach.travel, EXTENSION_FACTOR * (self.reach.tilt + TILT_MARGIN)
         reach = self.reach._replace(travel=travel, tilt=tilt)
         extended = _meeting(self.moving, self.reference, reach, self.size, has_form=self.has_form)
-        return None if extended is None else replace(extended, overhang=self.overhang, is_free=self.is_free, slant=self.slant)
+        return None if extended is None else replace(extended, overhang=self.overhang, is_free=self.is_free, slope=self.slope)
 
     @property
     def turn(self) -> float:
@@ -213,7 +214,7 @@ class Meeting:
         count = places_kernel.find(
             self.moving, self.reference, self.candidates,
             np.array(
-                [self.reach.depth, self.reach.height, np.inf if self.is_free else _passed(self.reach, self.size), self.slant]
+                [self.reach.depth, self.reach.height, np.inf if self.is_free else _passed(self.reach, self.size), self.slope]
             ),
             kernel.MARGIN * self.size + self.overhang,
             np.array([look.error, self.reach.depth, look.nearness, self.overhang]),

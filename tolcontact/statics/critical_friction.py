@@ -71,7 +71,7 @@ class Balance:
         """Yield each part that can rotate by itself, to first order, though forces press it: a point (3,) [mm], an axis (3,).
 
         Its rotation about the axis opens and closes no contact that a load presses together without friction, and takes no
-        work. Contacts that carry in no balance of the forces, such as a stop beside the part, do not hold it.
+        work. Contacts that are under load in no balance of the forces, such as a stop that nothing pushes at, do not hold it.
         """
         smooth = self._cones(self.contacts, 0 * self._equal(self.contacts))
         if not self._is_loaded(smooth) or smooth.held(0.0) <= MIN_HELD:
@@ -79,7 +79,7 @@ class Balance:
         owners, holds = self._owners(self.contacts), set[int]()
         for index in self.contacts:
             contact, points = self._touching.contacts[index], np.flatnonzero(owners == index)
-            if contact.is_guide or len(points) > 1 or smooth.can_carry(int(points[0])):
+            if contact.is_guide or len(points) > 1 or smooth.may_be_loaded(int(points[0])):
                 holds.add(index)
         contacts = [self._touching.contacts[index] for index in sorted(holds)]
         W = np.hstack([self._wrenches(contact, contact.normals) for contact in contacts])

@@ -19,7 +19,7 @@ SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
 MIN_HELD = 1e-6  # of the sum of all normal forces: a smaller balanced load is rounding
 MIN_FACTOR, MAX_FACTOR = 1e-6, 1e3  # of friction: smaller factors are 0, and larger ones do not exist
 BISECTIONS = 40
-MAX_CARRIED = 1e3  # times the sum of all forces: bounds the forces of contacts that press against each other
+MAX_FORCE = 1e3  # times the sum of all forces: bounds the forces of contacts that press against each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +57,10 @@ class ForceCones:
         """Return the largest balanced load, as a multiple s of the load, for normal forces with the sum 1 - s; 0 for none."""
         return self._balanced(factor)[0]
 
-    def can_carry(self, point: int) -> bool:
-        """Return whether a point carries in any balance of the load without friction."""
+    def may_be_loaded(self, point: int) -> bool:
+        """Return whether a point is under load in any balance of the forces without friction."""
         cost = -np.eye(1, len(self.roughness), point)[0]
-        found = scipy.optimize.linprog(cost, A_eq=self.normals, b_eq=-self.load, bounds=(0, MAX_CARRIED))
+        found = scipy.optimize.linprog(cost, A_eq=self.normals, b_eq=-self.load, bounds=(0, MAX_FORCE))
         return bool(found.status == 0 and -found.fun > MIN_HELD)
 
     def _balanced(self, factor: float) -> tuple[float, np.ndarray]:
