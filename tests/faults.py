@@ -201,7 +201,7 @@ class Store:
         if not (folder / "done").exists():
             print(f"first run of all tests, in {folder}", flush=True)
             shutil.rmtree(folder, ignore_errors=True)
-            options = ["--cov=tolcontact", "--cov-context=test", "--cov-report=", "tests"]
+            options = ["-n", "2", "--cov=tolcontact", "--cov-context=test", "--cov-report=", "tests"]
             run_tests(self.copy(0), folder, options, COVERAGE_FILE=str(folder / "coverage"))
             (folder / "done").touch()
         self.costs, failed = Counter(), set()
@@ -289,7 +289,9 @@ def pytest_runtest_logstart(nodeid: str) -> None:
 
 
 def pytest_runtest_logreport(report) -> None:
-    """Record the outcome of a test (as a plugin of pytest)."""
+    """Record the outcome of a test (as a plugin of pytest); of one in a worker the main process is told."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        return
     with (Path(os.environ["FAULTS"]) / "log.jsonl").open("a") as log:
         print(json.dumps([report.nodeid, report.outcome, report.duration]), file=log)
 
