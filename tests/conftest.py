@@ -42,15 +42,28 @@ def pytest_collection_finish():
     gc.freeze()
 
 
+GROWTH = 300 * 2**20  # bytes of memory that a process may grow by before it gives some back, which takes a while
+_memory = [0]  # of this process, when it last gave some back
+
+
+def _memory_in_use() -> int:
+    """Return the bytes of memory of this process; 0 where the system does not list them."""
+    with contextlib.suppress(OSError):
+        return 4096 * int(Path("/proc/self/statm").read_text().split()[1])
+    return 0
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _freed_memory():
-    """After a module, give the memory of what it made back to the system: hundreds of modules share a process."""
+    """Now and then, give the memory of what modules made back to the system: hundreds of modules share a process."""
     yield
     if sources := sys.modules.get("tests.sources"):
         sources.tree.cache_clear()
-    gc.collect()
-    with contextlib.suppress(OSError, AttributeError):  # the C library may be another one
-        ctypes.CDLL(None).malloc_trim(0)
+    if _memory_in_use() > _memory[0] + GROWTH:
+        gc.collect()
+        with contextlib.suppress(OSError, AttributeError):  # the C library may be another one
+            ctypes.CDLL(None).malloc_trim(0)
+        _memory[0] = _memory_in_use()
 
 
 def pytest_addoption(parser):

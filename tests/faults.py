@@ -211,7 +211,7 @@ class Store:
         self._passed = self.costs.keys() - failed
         data = coverage.CoverageData(folder / "coverage")
         data.read()
-        tests_of = {context: self._tests_of(*context.split("|")) for context in data.measured_contexts() if context}
+        tests_of = {context: self._tests_of(*context.rsplit("|", 1)) for context in data.measured_contexts() if context}
         self._reached = {
             file[file.rindex("tolcontact/") :]: {
                 line: set().union(*(tests_of[context] for context in contexts if context))

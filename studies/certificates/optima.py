@@ -20,7 +20,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from studies.certificates import ends, placements
+from studies.certificates import deviating, ends, placements
 from studies.certificates.coincidences import leaves_rotations_free, quick_builds
 from studies.certificates.pieces import convex_pieces
 from studies.certificates.polyhedra import Body, Polyhedron, separation
@@ -44,12 +44,16 @@ Poses = np.ndarray  # (body, 12)
 
 
 class Scene(NamedTuple):
-    """Bodies in the nominal assembly, of its parts in their order, the pairs of parts that may touch, and the range [mm]."""
+    """Bodies in the nominal assembly, of its parts in their order, the pairs of parts that may touch, and the range [mm].
+
+    `deviates` says that faces deviate; bodies are convex then.
+    """
 
     assembly: tc.Assembly
     bodies: list[Body]
     pairs: list[tuple[int, int]]
     range: float
+    deviates: bool = False
 
 
 class Moments(NamedTuple):
@@ -79,6 +83,12 @@ def placed_scene(seed: int, objective: str) -> Scene:
     families = list(placements.FAMILIES)
     scene = placements.scene(seed, families[seed % len(families)], objective)
     return Scene(scene.assembly, scene.bodies, list(scene.pairs), min(scene.ranges))
+
+
+def deviating_scene(seed: int, *, slanted: bool) -> Scene:
+    """Return a scene of `deviating.py`."""
+    assembly, bodies = deviating.scene(seed, slanted=slanted)
+    return case_scene(assembly, [[corners] for corners in bodies], assembly.smallest_zone())._replace(deviates=True)
 
 
 def model_scene(name: str) -> Scene:
@@ -269,13 +279,17 @@ def judged(scene: Scene, *, samples: int, seed: int, objective: str = ALL, solve
     R, t, status = run.rotation.values, run.translation.values, run.status.values
     poses = np.concatenate([R.reshape(*R.shape[:3], 9), t], axis=-1)
     search, rng, found = Search(scene, program, objective), np.random.default_rng(seed), []
+    deviations = program.draws(seed=seed, start=0, stop=samples)
     for k in np.flatnonzero(status <= Status.RESOLVED):
+        if scene.deviates:
+            bodies = deviating.deviated(scene.bodies, program, deviations[k])
+            search = Search(scene._replace(bodies=bodies), program, objective)
         raw, ours = (search.centred(poses[k, state]) for state in (RAW, CORRECTED))
         before, after, is_touched = search.distance(raw), search.distance(ours), status[k] == Status.RESOLVED
         row = {"seed": seed, "realization": int(k), "objective": objective}
         wrong = "inside" if after < -ALLOWED * scene.range else "falsely touched" if is_touched and before > TOUCHING else ""
         if wrong or not is_touched or before > -FEASIBLE * scene.range:
-            found.append(row | {"kind": wrong or "untouched"})
+            found.append(row | {"kind": wrong or "untouched", "distances": [before / scene.range, after / scene.range]})
             continue
         sides = counted(program, objective, poses[k, RAW])
         own = search.energy(raw, ours, sides)
@@ -326,13 +340,15 @@ def scene_of(kind: str, seed: int, objective: str) -> Scene:
     """Return a scene of a kind; of models, `seed` is the place in the list."""
     if kind == "models":
         return model_scene(MODELS[seed % len(MODELS)])
+    if kind in ("blocks", "frusta"):
+        return deviating_scene(seed, slanted=kind == "frusta")
     return placed_scene(seed, objective) if kind == "coincidences" else ends_scene(seed, kind == "whole")
 
 
 def main() -> int:
     """Judge scenes; return 1 if a better pose is near a resolved one."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--scenes-of", choices=("ends", "whole", "coincidences", "models"), default="ends")
+    parser.add_argument("--scenes-of", choices=("ends", "whole", "coincidences", "blocks", "frusta", "models"), default="ends")
     parser.add_argument("--objective", choices=(ALL, ACTIVE, STIFF), default=ALL)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--scenes", type=int, default=300)

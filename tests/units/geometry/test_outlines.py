@@ -40,14 +40,14 @@ def between(upper: trimesh.Trimesh, lower: trimesh.Trimesh) -> Meeting:
     return meeting(tuple(faces), bodies, Reach(travel=40.0, tilt=0.1, spread=20.0, overlap=0.0, clearance=0.0))
 
 
-@pytest.mark.parametrize("far", [1.5, 25.0])
+@pytest.mark.parametrize(("far", "spin"), [(1.5, 0.1), (6.0, 0.0), (25.0, 0.1)])
 @pytest.mark.parametrize("seed", range(12))
-def test_the_least_gap_is_that_of_the_overlap_wherever_the_holes_are(seed, far):
+def test_the_least_gap_is_that_of_the_overlap_wherever_the_holes_are(seed, far, spin):
     rng = np.random.default_rng(seed)
     (moving, upper), (reference, lower) = plate(rng, up=True), plate(rng, up=False)
     places, poses, expected = between(moving, reference), [], []
     for _ in range(60):
-        R = Rotation.from_rotvec(rng.normal(size=3) * [0.01, 0.01, 0.1]).as_matrix()
+        R = Rotation.from_rotvec(rng.normal(size=3) * [0.01, 0.01, spin]).as_matrix()
         t = np.array([*rng.uniform(-far, far, 2), rng.uniform(-0.3, 0.3)])
         poses.append(np.r_[R.ravel(), t])
         expected.append(least_gap(upper, lower, R, t))
@@ -56,22 +56,26 @@ def test_the_least_gap_is_that_of_the_overlap_wherever_the_holes_are(seed, far):
         assert np.abs(gaps - expected).max() < 1e-5  # the library's solids have 32 bits
 
 
-def drilled(width: float, places: list[float], *, up: bool) -> trimesh.Trimesh:
-    """Return a plate up to x = width, with holes of radius 4 at y = 8."""
+def drilled(width: float, places: list[float], *, up: bool, depth: float = 20.0) -> trimesh.Trimesh:
+    """Return a plate up to x = width and y = depth, with holes of radius 4 at y = 8."""
     low = 0.0 if up else -THICKNESS
-    box = trimesh.creation.box(bounds=[(-30, -20, low), (width, 20, low + THICKNESS)])
+    box = trimesh.creation.box(bounds=[(-30, -20, low), (width, depth, low + THICKNESS)])
     holes = [trimesh.creation.cylinder(4, 40, sections=12).apply_translation((x, 8, 0)) for x in places]
     return trimesh.boolean.difference([box, *holes], engine="manifold") if holes else box
 
 
-def test_a_hole_counts_where_it_holds_a_corner_of_the_other_plate():
-    upper, lower = drilled(30, [20], up=True), drilled(30, [], up=False)
-    t = np.array([9.0, 11.0, 0.0])  # the corner is in the middle of the hole
-    R = Rotation.from_rotvec([-0.02, 0.02, 0.0]).as_matrix()  # and is the lowest one
-    square = manifold3d.CrossSection.square((60, 40), center=True)
+@pytest.mark.parametrize(
+    ("width", "depth", "shift", "tilt"),
+    [(30.0, 20.0, (9.0, 11.0), 0.02), (14.5, 8.0, (-2.2, 0.0), 0.002)],  # by ten distances, and by one and a half
+)
+def test_a_hole_counts_where_it_holds_a_corner_of_the_other_plate(width, depth, shift, tilt):
+    upper, lower = drilled(30, [20], up=True), drilled(width, [], up=False, depth=depth)
+    t = np.array([*shift, 0.0])  # the corner is in the hole
+    R = Rotation.from_rotvec([-tilt, tilt, 0.0]).as_matrix()  # and is the lowest one
+    plates = [manifold3d.CrossSection([[(-30, -20), (x, -20), (x, y), (-30, y)]]) for x, y in ((30, 20), (width, depth))]
     hole = manifold3d.CrossSection([4 * np.column_stack([np.cos(a := np.arange(12) * np.pi / 6), np.sin(a)]) + [20, 8]])
-    expected, corner = least_gap(square - hole, square, R, t), least_gap(square, square, R, t)
-    assert expected > corner + 0.05
+    expected, corner = least_gap(plates[0] - hole, plates[1], R, t), least_gap(*plates, R, t)
+    assert expected > corner + tilt / 2
     assert between(upper, lower).at(np.r_[R.ravel(), t][None]).gaps.min() == pytest.approx(expected, abs=1e-5)
 
 

@@ -63,6 +63,13 @@ def test_of_whole_bodies_with_coinciding_corners(family):
     assert found
 
 
+def hinged_poses(rng, count, tilt):
+    """Poses tilted about axes beside plates: corners there are high over the other plane, and their projections far from it."""
+    R = Rotation.from_rotvec(rng.normal(0, tilt, (count, 3)) * [1, 1, 0.1]).as_matrix()
+    hinge = rng.uniform(-60, 60, (count, 3)) * [1, 1, 0]
+    return np.concatenate([R.reshape(-1, 9), hinge - np.einsum("nij,nj->ni", R, hinge)], axis=1)
+
+
 @pytest.mark.parametrize("seed", [0, 1, *nightly(*range(2, 6))])
 def test_of_plates_with_holes(seed):
     rng = np.random.default_rng(seed)
@@ -70,3 +77,4 @@ def test_of_plates_with_holes(seed):
     X = poses(rng, 150, 1.0, 0.005)
     X[::2, 9:11] *= 10
     assert assert_same_places(meeting, X) > 100
+    assert assert_same_places(meeting, hinged_poses(rng, 600, 0.1)) > 500

@@ -51,6 +51,17 @@ def test_neither_the_reach_nor_the_motion_of_bodies_changes_an_answer(name):
     assert np.array_equal(answers[0], answers[1]) and np.array_equal(answers[1], answers[2])
 
 
+def test_a_ball_interferes_with_another_one_wherever_its_middle_is():
+    """Within, it crosses no surface: of its vertices, those that nothing nominally comes near tell where it is."""
+    A, B = PAIRS["a small ball within or beside a large one"]
+    rng = np.random.default_rng(6)
+    X = np.concatenate([np.tile(np.eye(3).ravel(), (2000, 1)), rng.normal(0, 0.6, (2000, 3))], axis=1)
+    distance = np.linalg.norm(X[:, 9:] - [1.0, 0, 0], axis=1)
+    is_sure = np.abs(distance - 1.3) > 0.03  # more than the triangles cut off
+    assert ((distance < 0.65) & is_sure).sum() > 100
+    assert np.array_equal(Neighbours(A, B, INSETS, 0.2).interfere(X)[is_sure], distance[is_sure] < 1.3)
+
+
 def cubes(tolerance, width):
     """Cubes in space, 0 to 0.35 mm apart, that collide by the tolerance of locators, or the profile of some faces."""
     a = tc.Assembly("cubes")
@@ -90,3 +101,21 @@ def test_pairs_of_bodies_that_are_not_looked_at_do_not_interfere(tolerance, widt
         assert found.get(pair, set()) == rows
         count += bool(rows)
     assert count >= least
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_bodies_that_move_by_little_more_than_their_distance_are_looked_at():
+    program = compiled(cubes(0.5, 0.3), solver="daqp")
+    boxes = np.array([part.body.bounds for part in program.nominal.parts])
+    nominal, neighbours = np.zeros((1, len(program.nominal.contributors))), 0
+    for (i, j), axis in itertools.product(itertools.combinations(range(8), 2), range(3)):
+        gaps = np.maximum(boxes[i, 0] - boxes[j, 1], boxes[j, 0] - boxes[i, 1])
+        if gaps[axis] < 0 or (np.delete(gaps, axis) > -1).any():
+            continue
+        neighbours += 1
+        for beyond in (0.01, -0.01):
+            at = np.tile(np.r_[np.eye(3).ravel(), np.zeros(3)], (1, 8, 1))
+            at[0, [i, j], 9 + axis] = (gaps[axis] + beyond) / 2 * np.array([1, -1])
+            found = {clash.pair for clash in program.watch.clashes(at, nominal)}
+            assert ((i, j) in found) == (beyond > 0)
+    assert neighbours == 12

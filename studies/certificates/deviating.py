@@ -1,0 +1,62 @@
+"""Random blocks, or frusta, on each other, whose flat faces deviate: shifted and tilted within their zones.
+
+The rims of a frustum move along its slanted walls. Contact leaves them where they are nominally, which is an error of second
+order: the deviation of the face, times the slant of the walls, times the angle between the faces.
+"""
+
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+import tolcontact as tc
+from studies.certificates.polyhedra import Body, Polyhedron
+
+RANGES = 0.1, 0.6  # mm: of the zones of faces, and of locators
+HEIGHT = 4.0  # mm
+
+
+def block(rng: np.random.Generator, *, face_up: bool, slanted: bool) -> np.ndarray:
+    """Return the corners (8, 3) of a block or a frustum with a face at height 0, on its top or its underside."""
+    half, share = rng.uniform(3, 9, 2), rng.choice([0.8, 1.2]) if slanted else 1.0
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * half
+    corners = np.concatenate([np.column_stack([square, np.zeros(4)]), np.column_stack([share * square, np.full(4, HEIGHT)])])
+    turned = Rotation.from_rotvec([0, 0, rng.choice([0.0, np.pi / 4, rng.uniform(0, np.pi)])]).apply(corners)
+    return turned * [1, 1, -1] if face_up else turned
+
+
+def scene(seed: int, *, slanted: bool) -> tuple[tc.Assembly, list[np.ndarray]]:
+    """Return an assembly of a base with one or two bodies on it, turned in space, and their corners in the assembly."""
+    rng = np.random.default_rng(seed)
+    turn = Rotation.random(random_state=seed % 2**31) if seed % 3 == 0 else Rotation.identity()
+    assembly, bodies = tc.Assembly(f"scene {seed}"), list[np.ndarray]()
+    for k in range(2 + seed % 2):
+        corners = block(rng, face_up=k == 0, slanted=slanted) + (rng.uniform(-6, 6, 3) * [1, 1, 0] if k else 0)
+        bodies.append(turn.apply(corners))
+        part = assembly.part(f"body {k}", tc.Mesh(trimesh.convex.convex_hull(bodies[-1])), fixed=k == 0)
+        up, sign = turn.apply([0, 0, 1.0]), 1.0 if k == 0 else -1.0
+        part.feature("back", part.face(lambda c, n, d=-sign * up: n @ d > 0.999), datum="A")
+        width = float(rng.uniform(*RANGES))
+        face = part.feature("face", part.face(lambda c, n, d=sign * up: n @ d > 0.999), tc.Profile(width, "A"))
+        if k == 0:
+            base = face
+            continue
+        feet = (((-9, -9, 0), "z"), ((9, -9, 0), "z"), ((0, 9, 0), "z"), ((-9, 0, 0), "y"), ((9, 0, 0), "y"), ((0, 0, 0), "x"))
+        axes = dict(zip("xyz", turn.as_matrix().T, strict=True))
+        range_ = float(rng.uniform(*RANGES))
+        locators = [tc.Locator(f"L{j}", turn.apply(p), axes[along], range_) for j, (p, along) in enumerate(feet)]
+        assembly.locate(part, locators)
+        assembly.contact(f"joint {k}", moving=face, reference=base, within=50)
+        assembly.measure(f"height {k}", part.point(0, 0, 0), along="z", tolerance=1)
+    return assembly, bodies
+
+
+def deviated(bodies: list[Body], program: tc.Program, deviations: np.ndarray) -> list[Body]:
+    """Return convex bodies with the deviations (contributor,) of their faces."""
+    found = []
+    for number, body in enumerate(bodies):
+        solid = program.watch.solid(number)
+        assert solid is not None
+        corners, (moved, motions) = solid.solid.vertices.copy(), solid.motions
+        corners[moved] += motions @ deviations[solid.columns]
+        found.append([Polyhedron(corners)] if solid.varies else body)
+    return found
