@@ -245,11 +245,13 @@ class Store:
         return [test for test, total in zip(ordered, spent, strict=True) if total < budget]
 
     def _using(self, module: str) -> set[str]:
-        found = set()
+        """Tests that reach a line with a name of a module; or where it is imported by names, a file that does so."""
+        found, importers = set(), set()
         for file, reached in self._reached.items():
             for number, line in enumerate((ROOT / file).read_text().splitlines(), 1):
                 found |= reached.get(number, set()) if re.search(rf"\b{module}\.\w", line) else set()
-        return found
+                importers |= {file} if re.search(rf"\.{module} import", line) else set()
+        return found or set().union(*(tests for file in importers for tests in self._reached[file].values()))
 
 
 def records_in(file: Path | None) -> list:

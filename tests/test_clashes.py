@@ -15,6 +15,7 @@ from scipy.stats import norm
 
 import tolcontact as tc
 from tests.helpers import assembly_of, call
+from tests.step_files import step_block
 from tolcontact.report import summary_text
 from tolcontact.testing import assert_no_clashes, assert_resolved
 
@@ -266,3 +267,30 @@ def test_pairs_of_parts_are_combined_once():
     assembly.may_overlap(*reversed(assembly.parts))
     allowed = tc.build(assembly).watch.allowed
     assert all(allowed[pair] == math.inf for pair in itertools.combinations(range(3), 2))
+
+
+def test_the_suggested_line_chooses_faces_of_step_files_that_end_the_clash(tmp_path):
+    (tmp_path / "block.step").write_text(step_block())  # of 10 x 20 x 30
+    shape, added = tc.Mesh(tmp_path / "block.step"), list[str]()
+
+    def nook() -> tc.Assembly:
+        assembly = tc.Assembly("nook", method=tc.Method(resolution="exact", objective="all points"))
+        base, wall = (
+            assembly.part("base", tc.Box(100, 60, 10), fixed=True),
+            assembly.part("wall", shape, at=(0, 0, 10), fixed=True),
+        )
+        block = assembly.part("block", shape, at=(10 + CLEARANCE, 0, 10))
+        feet = [("A1", (2, 2, 0), "z"), ("A2", (8, 2, 0), "z"), ("A3", (5, 18, 0), "z"), ("B1", (2, 0, 9), "y")]
+        locators = [tc.Locator(*foot, 0) for foot in [*feet, ("B2", (8, 0, 9), "y")]]
+        assembly.locate(block, [*locators, tc.Locator("C", (10, 10, 15), "-x", 6 * SIGMA)])
+        assembly.contact("seat", moving=block.face("-z"), reference=base.face("+z"))
+        assembly.measure("x", block.point(0, 10, 15), along="x", limits=(-1, 1))
+        for line in added:
+            exec(line, {"tc": tc, "assembly": assembly, "wall": wall, "block": block})
+        return assembly
+
+    (text,) = warned(nook())
+    added.append(re.search(r"assembly\.contact\(.*\)(?=, or say)", text)[0])
+    assert added[0].count("tc.select.Brep(") == 2
+    assert not warned(nook())
+    assert_no_clashes(tc.run(nook(), samples=200, seed=1, surfaces=0))

@@ -2,13 +2,18 @@
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests.cases.fits import shaft_in_a_bore
 from tests.helpers import compiled, nightly
 from tests.test_round_forms import form_of, radial_terms
+from tolcontact.features.associated_features import AssociatedSurface
+from tolcontact.features.covariances import Lengths
 from tolcontact.features.minimum_zone import minimum_widths
+from tolcontact.geometry.analytic_surfaces import Sphere
+from tolcontact.geometry.surface import Surface
 
 
 def width_by_programme(terms, heights):
@@ -38,3 +43,12 @@ def test_zones_of_cylinders_are_those_of_a_linear_programme(tolerance):
         expected = np.maximum(expected, widths)
     np.testing.assert_allclose(minimum_widths(field.zone, heights), expected, rtol=1e-6)
     assert 0.01 < expected.mean() < 0.05
+
+
+def test_places_of_a_ball_lie_on_it_and_not_on_its_triangles():
+    centre = np.array([3.0, -2, 5])
+    mesh = trimesh.creation.icosphere(2, 10).apply_translation(centre)
+    associated = AssociatedSurface.of(Sphere(centre, np.array([0.0, 0, 1]), radius=10.0), Surface(mesh))
+    places, areas = associated.places(Surface(mesh), Lengths(6.0, 6.0))
+    np.testing.assert_allclose(np.linalg.norm(places - centre, axis=1), 10, rtol=1e-12)
+    assert areas.sum() == pytest.approx(4 * np.pi * 100, rel=0.03)
