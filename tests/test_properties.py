@@ -41,8 +41,8 @@ AT_NIGHT = {
     "three stations": (lambda: stations.three_stations(0.3), EXACT),
     "measurements": (measured.seated, None),
 }
-# mm: where faces have form, places of contact are looked for on lines that depend on the frame.
-OF_FRAME = {"a fit with form": 5e-3, "a seat with form": 1e-4}
+# mm: sampled points of planes with form depend on the frame.
+OF_FRAME = {"a seat with form": 1e-4}
 
 
 class Scene:

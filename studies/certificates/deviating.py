@@ -6,6 +6,7 @@ order: the deviation of the face, times the slant of the walls, times the angle 
 
 import numpy as np
 import trimesh
+from scipy.spatial import HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
@@ -13,6 +14,7 @@ from studies.certificates.polyhedra import Body, Polyhedron
 
 RANGES = 0.1, 0.6  # mm: of the zones of faces, and of locators
 HEIGHT = 4.0  # mm
+ON_PLANE = 1e-9  # mm
 
 
 def block(rng: np.random.Generator, *, face_up: bool, slanted: bool) -> np.ndarray:
@@ -24,8 +26,11 @@ def block(rng: np.random.Generator, *, face_up: bool, slanted: bool) -> np.ndarr
     return turned * [1, 1, -1] if face_up else turned
 
 
-def scene(seed: int, *, slanted: bool) -> tuple[tc.Assembly, list[np.ndarray]]:
-    """Return an assembly of a base with one or two bodies on it, turned in space, and their corners in the assembly."""
+def scene(seed: int, *, slanted: bool = False, pressed: bool = False) -> tuple[tc.Assembly, list[np.ndarray]]:
+    """Return an assembly of a base with one or two bodies on it, turned in space, and their corners in the assembly.
+
+    Forces press on bodies that are `pressed`, and the locators below them are one-sided.
+    """
     rng = np.random.default_rng(seed)
     turn = Rotation.random(random_state=seed % 2**31) if seed % 3 == 0 else Rotation.identity()
     assembly, bodies = tc.Assembly(f"scene {seed}"), list[np.ndarray]()
@@ -43,20 +48,40 @@ def scene(seed: int, *, slanted: bool) -> tuple[tc.Assembly, list[np.ndarray]]:
         feet = (((-9, -9, 0), "z"), ((9, -9, 0), "z"), ((0, 9, 0), "z"), ((-9, 0, 0), "y"), ((9, 0, 0), "y"), ((0, 0, 0), "x"))
         axes = dict(zip("xyz", turn.as_matrix().T, strict=True))
         range_ = float(rng.uniform(*RANGES))
-        locators = [tc.Locator(f"L{j}", turn.apply(p), axes[along], range_) for j, (p, along) in enumerate(feet)]
-        assembly.locate(part, locators)
+        assembly.locate(
+            part,
+            [
+                tc.Locator(f"L{j}", turn.apply(p), axes[along], range_, one_sided=pressed and along == "z")
+                for j, (p, along) in enumerate(feet)
+            ],
+        )
+        if pressed:
+            at = corners.mean(axis=0) + rng.uniform(-1, 1, 3) * corners.std(axis=0)
+            assembly.force(f"press {k}", at=part.point(*turn.apply(at)), vector=turn.apply([0, 0, -10.0]))
         assembly.contact(f"joint {k}", moving=face, reference=base, within=50)
         assembly.measure(f"height {k}", part.point(0, 0, 0), along="z", tolerance=1)
     return assembly, bodies
 
 
 def deviated(bodies: list[Body], program: tc.Program, deviations: np.ndarray) -> list[Body]:
-    """Return convex bodies with the deviations (contributor,) of their faces."""
+    """Return convex bodies with the deviations (contributor,) of their faces: half-spaces whose planes shift and tilt.
+
+    Of the simulation's bodies only the heights of corners over the nominal planes are used.
+    """
     found = []
-    for number, body in enumerate(bodies):
+    for number, (piece,) in enumerate(bodies):
         solid = program.watch.solid(number)
         assert solid is not None
-        corners, (moved, motions) = solid.solid.vertices.copy(), solid.motions
-        corners[moved] += motions @ deviations[solid.columns]
-        found.append([Polyhedron(corners)] if solid.varies else body)
+        moved, motions = solid.motions
+        corners, motion = solid.solid.vertices[moved], motions @ deviations[solid.columns]
+        halfspaces = np.column_stack([piece.normals, -piece.offsets])
+        for k, n in enumerate(piece.normals):
+            of_face = np.abs(corners @ n - piece.offsets[k]) < ON_PLANE
+            heights = motion[of_face] @ n
+            if np.abs(heights).max(initial=0) > ON_PLANE:
+                points = corners[of_face] + heights[:, None] * n
+                normal = np.linalg.svd(points - points.mean(axis=0))[2][-1]
+                normal *= np.sign(normal @ n)
+                halfspaces[k] = [*normal, -normal @ points.mean(axis=0)]
+        found.append([Polyhedron(HalfspaceIntersection(halfspaces, piece.centre).intersections)])
     return found

@@ -29,7 +29,7 @@ from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 BETTER = 1e-3  # share of the objective
 # Shares of the tolerance range
-LEAST = 2e-4  # displacement whose square counts as no objective
+LEAST = 2e-4  # displacement that counts as none
 NEAR = 0.1  # between two poses, at any corner of a body
 FEASIBLE = 2e-7  # penetration that a pose may have
 ALLOWED = 5e-4  # penetration that is not contradicted by a certificate
@@ -38,7 +38,7 @@ SPREAD = 0.05, 1.0  # rad and ranges of random starts
 MAX_PIECES = 500  # pairs of pieces with a plane
 MODELS = ("cells", "channel", "ra1", "tower", "ra2")
 NO_BETTER = "none better"
-STIFF, ALL, ACTIVE = "locator stiffness", "all points", "active points"
+STIFF, ALL, ACTIVE, SEATING = "locator stiffness", "all points", "active points", "seating"
 ACTIVE_GAP, TOUCHING = 1e-9, 1e-6  # mm
 Poses = np.ndarray  # (body, 12)
 
@@ -85,9 +85,9 @@ def placed_scene(seed: int, objective: str) -> Scene:
     return Scene(scene.assembly, scene.bodies, list(scene.pairs), min(scene.ranges))
 
 
-def deviating_scene(seed: int, *, slanted: bool) -> Scene:
+def deviating_scene(seed: int, **options: bool) -> Scene:
     """Return a scene of `deviating.py`."""
-    assembly, bodies = deviating.scene(seed, slanted=slanted)
+    assembly, bodies = deviating.scene(seed, **options)
     return case_scene(assembly, [[corners] for corners in bodies], assembly.smallest_zone())._replace(deviates=True)
 
 
@@ -149,6 +149,7 @@ class Search:
         self.centre = np.mean(np.concatenate(corners), axis=0)
         self.corners = [points - self.centre for points in corners]
         self.size = float(np.abs(np.concatenate(self.corners)).max())
+        self.power = 1 if objective == SEATING else 2  # of lengths in the objective
 
     def centred(self, poses: Poses) -> Poses:
         """Return poses of coordinates about the centre of the scene, where numbers are small."""
@@ -161,6 +162,12 @@ class Search:
 
     def _energy(self, raw: list, poses: list, sides: list[Moments]):  # type: ignore[no-untyped-def]
         value, total = 0.0, 0.0
+        if self.objective == SEATING:  # without the quadratic term, whose share is a thousandth of travel / size
+            for force in self.program.nominal.assembly.forces:
+                k, point, vector = self.program.nominal.part_index(force.at.part), ca.DM(force.at.position), ca.DM(force.vector)
+                value -= ca.dot(vector, applied(poses[k], point - self.centre) - applied(raw[k], point - self.centre))
+                total += float(np.linalg.norm(force.vector))
+            return value / total
         if self.objective == STIFF:
             for k in self.movers:
                 locators = self.program.nominal.parts[k].locators
@@ -220,7 +227,13 @@ class Search:
             lower += [0.0] * (len(a.corners) + len(b.corners)) + [1.0]
             upper += [np.inf] * (len(a.corners) + len(b.corners)) + [1.0]
             first.append(plane(*(piece_at(piece, start[part], self.centre) for part, piece in ((m, a), (r, b)))))
-        energy = self._energy([ca.DM(row) for row in raw], poses, sides) / self.scene.range**2
+        if self.objective == SEATING:
+            for k in self.movers:
+                locators = self.program.nominal.parts[k].locators
+                for p, n, is_stop in zip(locators.points - self.centre, locators.directions, locators.one_sided, strict=True):
+                    rows.append(ca.dot(n, applied(poses[k], p) - applied(ca.DM(raw[k]), p)))
+                    lower, upper = [*lower, 0.0], [*upper, np.inf if is_stop else 0.0]
+        energy = self._energy([ca.DM(row) for row in raw], poses, sides) / self.scene.range**self.power
         quiet: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 200}
         exact: dict[str, Any] = {"ipopt.tol": 1e-10, "ipopt.bound_relax_factor": 0.0, "ipopt.constr_viol_tol": 1e-10}
         warm: dict[str, Any] = {"ipopt.mu_init": 1e-4, "ipopt.mu_strategy": "adaptive"}
@@ -286,18 +299,19 @@ def judged(scene: Scene, *, samples: int, seed: int, objective: str = ALL, solve
             search = Search(scene._replace(bodies=bodies), program, objective)
         raw, ours = (search.centred(poses[k, state]) for state in (RAW, CORRECTED))
         before, after, is_touched = search.distance(raw), search.distance(ours), status[k] == Status.RESOLVED
+        is_moved = is_touched and objective != SEATING  # where forces move bodies that are apart, too
         row = {"seed": seed, "realization": int(k), "objective": objective}
-        wrong = "inside" if after < -ALLOWED * scene.range else "falsely touched" if is_touched and before > TOUCHING else ""
-        if wrong or not is_touched or before > -FEASIBLE * scene.range:
+        wrong = "inside" if after < -ALLOWED * scene.range else "falsely touched" if is_moved and before > TOUCHING else ""
+        if wrong or (objective != SEATING and (not is_touched or before > -FEASIBLE * scene.range)):
             found.append(row | {"kind": wrong or "untouched", "distances": [before / scene.range, after / scene.range]})
             continue
-        sides = counted(program, objective, poses[k, RAW])
+        sides = [] if objective == SEATING else counted(program, objective, poses[k, RAW])
         own = search.energy(raw, ours, sides)
         near = search.least(raw, ours, sides)
         others = [search.least(raw, at_random(rng, ours, search), sides) for _ in range(starts)]
         best = min((each for each in (near, *others) if each is not None), key=lambda each: each[0], default=None)
-        limit = (LEAST * scene.range) ** 2
-        again = sum(each is not None and abs(each[0] - own) <= BETTER * own + limit for each in others)
+        limit = (LEAST * scene.range) ** search.power
+        again = sum(each is not None and abs(each[0] - own) <= BETTER * abs(own) + limit for each in others)
         row |= {"ours": own, "found again": again} | compared(own, ours, near, best, search)
         found.append(row | {"kind": kind_of(row)})
     return found
@@ -321,7 +335,8 @@ def compared(own: float, ours: Poses, near: Any, best: Any, search: Search) -> d
     """Return the least objectives found from the resolved pose and from anywhere, and the way [ranges] there."""
     found: dict[str, Any] = {}
     for name, other in (("near", near), ("best", best)):
-        is_better = other is not None and other[0] < own * (1 - BETTER) - (LEAST * search.scene.range) ** 2
+        limit = BETTER * abs(own) + (LEAST * search.scene.range) ** search.power
+        is_better = other is not None and other[0] < own - limit
         way = search.way(other[1], ours) / search.scene.range if other else 0.0
         found |= {name: other[0] if other else None, f"{name} is better": is_better, f"way to {name}": way}
     return found
@@ -341,7 +356,7 @@ def scene_of(kind: str, seed: int, objective: str) -> Scene:
     if kind == "models":
         return model_scene(MODELS[seed % len(MODELS)])
     if kind in ("blocks", "frusta"):
-        return deviating_scene(seed, slanted=kind == "frusta")
+        return deviating_scene(seed, slanted=kind == "frusta", pressed=objective == SEATING)
     return placed_scene(seed, objective) if kind == "coincidences" else ends_scene(seed, kind == "whole")
 
 
@@ -349,7 +364,7 @@ def main() -> int:
     """Judge scenes; return 1 if a better pose is near a resolved one."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes-of", choices=("ends", "whole", "coincidences", "blocks", "frusta", "models"), default="ends")
-    parser.add_argument("--objective", choices=(ALL, ACTIVE, STIFF), default=ALL)
+    parser.add_argument("--objective", choices=(ALL, ACTIVE, STIFF, SEATING), default=ALL)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--scenes", type=int, default=300)
     parser.add_argument("--samples", type=int, default=5)

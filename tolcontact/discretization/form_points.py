@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
-from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
+from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.overlap import rim_points
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import PARALLEL, SAME_PLACE
@@ -81,7 +81,8 @@ def facing_triangles(face: Surface, other: Surface, deviation: FaceDeviation | N
 def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> np.ndarray | None:
     """Return points (point, 3) [mm] of a cylinder inside or around a parallel one, with form; None for other faces.
 
-    They form a grid of azimuths, and of coordinates along the axis where both faces are.
+    They form a grid of azimuths, from a vertex on, so that it rotates with the part, and of coordinates along the axis where
+    both faces are.
     """
     shaft, bore = (face.surfaces[0] if len(face.surfaces) == 1 else None for face in (moving, reference))
     if not (isinstance(shaft, Cylinder) and isinstance(bore, Cylinder)):
@@ -97,7 +98,8 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
     inset = END_SHARE * (end - start)
     heights = np.linspace(start + inset, end - inset, int(np.ceil((end - start) / (ALONG_SHARE * along))) + 1)
     count = max(int(np.ceil(2 * np.pi * shaft.radius / (SPACING_SHARE * across))), MIN_AZIMUTHS)
-    u = axes_across(shaft.axis)[0]
+    arm = moving.vertices[0] - shaft.origin
+    u = (arm - arm @ shaft.axis * shaft.axis) / np.linalg.norm(np.cross(arm, shaft.axis))
     outward = [np.cos(turn) * u + np.sin(turn) * np.cross(shaft.axis, u) for turn in np.arange(count) * 2 * np.pi / count]
     points = shaft.origin + heights[:, None, None] * shaft.axis + shaft.radius * np.array(outward)
     points = points.reshape(-1, 3)
