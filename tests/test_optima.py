@@ -5,7 +5,18 @@ import pytest
 
 import tolcontact as tc
 from studies.certificates import optima
-from studies.certificates.optima import ALL, Search, case_scene, compared, counted, ends_scene, judged, placed_scene
+from studies.certificates.optima import (
+    ALL,
+    SEATING,
+    Search,
+    case_scene,
+    compared,
+    counted,
+    ends_scene,
+    judged,
+    placed_scene,
+    scene_of,
+)
 from tests.cases.ends import case
 from tests.helpers import nightly
 
@@ -34,6 +45,13 @@ CORNERS_ON_EDGES = [(92006, 2), *nightly((92003, 2), (92199, 3), (92230, 3))]
 @pytest.mark.parametrize(("seed", "samples"), CORNERS_ON_EDGES)
 def test_nor_where_corners_lie_on_edges(seed, samples):
     rows = judged(placed_scene(seed, ALL), samples=samples, seed=seed, starts=0)
+    assert {row["kind"] for row in rows} == {"none better"}
+
+
+@pytest.mark.parametrize("objective", [ALL, SEATING])
+@pytest.mark.parametrize("seed", [1, *nightly(7, 14)])
+def test_nor_where_faces_deviate_or_forces_press(seed, objective):
+    rows = judged(scene_of("blocks", seed, objective), samples=3, seed=seed, objective=objective, starts=0)
     assert {row["kind"] for row in rows} == {"none better"}
 
 

@@ -137,12 +137,13 @@ def split(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 class Search:
     """Poses of bodies that stay outside of each other, as near to raw poses as can be.
 
-    parts     (body,): the part of each body
-    movers    the bodies that move
+    deviations   by contributor [mm]; only "seating" needs them, where locators hold exactly
+    movers       the bodies that move
     """
 
-    def __init__(self, scene: Scene, program: tc.Program, objective: str) -> None:
+    def __init__(self, scene: Scene, program: tc.Program, objective: str, deviations: np.ndarray | None = None) -> None:
         self.scene, self.program, self.objective = scene, program, objective
+        self.deviations = {} if deviations is None else dict(zip(program.draws.labels, deviations, strict=True))
         nominal = program.nominal
         self.movers = [k for k in range(len(scene.bodies)) if nominal.parts[k].movers]
         corners = [np.concatenate([piece.corners for piece in body]) for body in scene.bodies]
@@ -230,8 +231,10 @@ class Search:
         if self.objective == SEATING:
             for k in self.movers:
                 locators = self.program.nominal.parts[k].locators
-                for p, n, is_stop in zip(locators.points - self.centre, locators.directions, locators.one_sided, strict=True):
-                    rows.append(ca.dot(n, applied(poses[k], p) - applied(ca.DM(raw[k]), p)))
+                for p, n, label, is_stop in zip(
+                    locators.points - self.centre, locators.directions, locators.labels, locators.one_sided, strict=True
+                ):
+                    rows.append(ca.dot(n, applied(poses[k], p) - p) - self.deviations[label])
                     lower, upper = [*lower, 0.0], [*upper, np.inf if is_stop else 0.0]
         energy = self._energy([ca.DM(row) for row in raw], poses, sides) / self.scene.range**self.power
         quiet: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 200}
@@ -291,12 +294,11 @@ def judged(scene: Scene, *, samples: int, seed: int, objective: str = ALL, solve
     run = tc.run(program, samples=samples, seed=seed, fields="none", surfaces=0)
     R, t, status = run.rotation.values, run.translation.values, run.status.values
     poses = np.concatenate([R.reshape(*R.shape[:3], 9), t], axis=-1)
-    search, rng, found = Search(scene, program, objective), np.random.default_rng(seed), []
+    rng, found = np.random.default_rng(seed), []
     deviations = program.draws(seed=seed, start=0, stop=samples)
     for k in np.flatnonzero(status <= Status.RESOLVED):
-        if scene.deviates:
-            bodies = deviating.deviated(scene.bodies, program, deviations[k])
-            search = Search(scene._replace(bodies=bodies), program, objective)
+        bodies = deviating.deviated(scene.bodies, program, deviations[k]) if scene.deviates else scene.bodies
+        search = Search(scene._replace(bodies=bodies), program, objective, deviations[k])
         raw, ours = (search.centred(poses[k, state]) for state in (RAW, CORRECTED))
         before, after, is_touched = search.distance(raw), search.distance(ours), status[k] == Status.RESOLVED
         is_moved = is_touched and objective != SEATING  # where forces move bodies that are apart, too
