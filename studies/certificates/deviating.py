@@ -4,6 +4,8 @@ The rims of a frustum move along its slanted walls. Contact leaves them where th
 order: the deviation of the face, times the slant of the walls, times the angle between the faces.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import trimesh
 from scipy.spatial import HalfspaceIntersection
@@ -26,6 +28,11 @@ def block(rng: np.random.Generator, *, face_up: bool, slanted: bool) -> np.ndarr
     return turned * [1, 1, -1] if face_up else turned
 
 
+def facing(direction: np.ndarray) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """Return what chooses the triangles of a face with a normal."""
+    return lambda centres, normals: np.asarray(normals @ direction > 0.999)
+
+
 def scene(seed: int, *, slanted: bool = False, pressed: bool = False) -> tuple[tc.Assembly, list[np.ndarray]]:
     """Return an assembly of a base with one or two bodies on it, turned in space, and their corners in the assembly.
 
@@ -39,9 +46,9 @@ def scene(seed: int, *, slanted: bool = False, pressed: bool = False) -> tuple[t
         bodies.append(turn.apply(corners))
         part = assembly.part(f"body {k}", tc.Mesh(trimesh.convex.convex_hull(bodies[-1])), fixed=k == 0)
         up, sign = turn.apply([0, 0, 1.0]), 1.0 if k == 0 else -1.0
-        part.feature("back", part.face(lambda c, n, d=-sign * up: n @ d > 0.999), datum="A")
+        part.feature("back", part.face(facing(-sign * up)), datum="A")
         width = float(rng.uniform(*RANGES))
-        face = part.feature("face", part.face(lambda c, n, d=sign * up: n @ d > 0.999), tc.Profile(width, "A"))
+        face = part.feature("face", part.face(facing(sign * up)), tc.Profile(width, "A"))
         if k == 0:
             base = face
             continue

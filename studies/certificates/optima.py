@@ -165,7 +165,11 @@ class Search:
         value, total = 0.0, 0.0
         if self.objective == SEATING:  # without the quadratic term, whose share is a thousandth of travel / size
             for force in self.program.nominal.assembly.forces:
-                k, point, vector = self.program.nominal.part_index(force.at.part), ca.DM(force.at.position), ca.DM(force.vector)
+                k, point, vector = (
+                    self.program.nominal.part_index(force.at.part),
+                    ca.DM(np.asarray(force.at.position)),
+                    ca.DM(force.vector),
+                )
                 value -= ca.dot(vector, applied(poses[k], point - self.centre) - applied(raw[k], point - self.centre))
                 total += float(np.linalg.norm(force.vector))
             return value / total

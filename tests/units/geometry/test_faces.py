@@ -24,6 +24,16 @@ def test_a_brep_face_is_found_by_a_point_on_it():
     assert hole.mesh.area == pytest.approx(2 * np.pi * 4 * 12, rel=1e-3)
 
 
+def test_a_place_off_a_hole_is_projected_along_its_radius_though_facets_are_flat():
+    hole = face_of(HOUSING, tc.select.Brep((19, 15, 35)))  # its facets reach from rim to rim
+    rng = np.random.default_rng(2)
+    angle, low, high = rng.uniform(0, 2 * np.pi, 300), *hole.mesh.bounds[:, 2]
+    around, z = np.c_[np.cos(angle), np.sin(angle)], rng.uniform(low + 0.1, high - 0.1, 300)
+    nearest, _, over = hole.project(np.c_[[15, 15] + 3.5 * around, z])
+    assert over.all()
+    np.testing.assert_allclose(nearest, np.c_[[15, 15] + 4 * around, z], atol=1e-9)
+
+
 @pytest.mark.parametrize("turn", [0.0, 1e-3, 0.2])
 def test_faces_penetrate_each_other_where_their_depth_is_not_0(turn):
     table, block = (trimesh.creation.box(extents) for extents in ((100, 60, 10), (40, 30, 10)))
