@@ -32,33 +32,39 @@ def round_part(size: tc.Size, *, inner: bool, standard: str = "", form: float = 
     return a
 
 
-def depths_in_gauge(model: tc.Assembly, samples: int) -> np.ndarray:
-    """How far (realization,) [mm] each wall is at least beyond a perfect cylinder of radius 5, which may lie anywhere.
+def depths_in_gauge(model: tc.Assembly, samples: int, oversize: float = 0.0) -> np.ndarray:
+    """How far (realization,) [mm] each wall is at least beyond a perfect cylinder, which may lie anywhere.
+
+    Its diameter is 10 and an `oversize`.
 
     A linear programme over shifts and tilts of the gauge, for heights on a grid that the package does not use.
     """
     program, run = simulate(model, samples=samples, solver="daqp")
     feature = program.nominal.features[0]
     outward = coefficients(program, run, "wall") @ feature.form.heights(WALL).T
-    outward += run["deviations"][:, feature.size_column, None] * (-0.5 if feature.geometry.is_inner else 0.5)
+    outward += (run["deviations"][:, feature.size_column, None] - oversize) * (-0.5 if feature.geometry.is_inner else 0.5)
     motions = np.column_stack([NORMALS[:, :2], Z * NORMALS[:, 0], Z * NORMALS[:, 1]])
     A = np.column_stack([motions, -np.ones(len(WALL))])
     bounds = [(None, None)] * 5
     return np.array([scipy.optimize.linprog([0, 0, 0, 0, 1], A, -heights, bounds=bounds).fun for heights in outward])
 
 
-@pytest.mark.parametrize("inner", [False, *nightly(True)])
-def test_every_part_enters_its_envelope_and_by_independency_some_do_not(inner):
-    """A pin 10 (0/-0.015), or a bore 10 (+0.015/0), with cylindricity 0.01 and a perfect gauge of 10.000."""
-    limits = (0.015, 0.0) if inner else (0.0, -0.015)
-    sizes = {choice: tc.Size(10, *limits, distribution="truncated normal", envelope=choice) for choice in (True, False, None)}
-    enveloped = depths_in_gauge(round_part(sizes[True], inner=inner), 60)
-    independent = depths_in_gauge(round_part(sizes[False], inner=inner), 60)
+@pytest.mark.parametrize(("inner", "oversize"), [(False, 0.01), *nightly((True, 0.01), (False, 0.0))])
+def test_every_part_enters_its_envelope_and_by_independency_some_do_not(inner, oversize):
+    """A pin 10.01 (0/-0.015), or a bore 10.01 (+0.015/0), with cylindricity 0.01 and a perfect gauge of 10.010."""
+    limits = (oversize + 0.015, oversize) if inner else (oversize, oversize - 0.015)
+
+    def depths(envelope: bool | None, standard: str = "") -> np.ndarray:
+        size = tc.Size(10, *limits, distribution="truncated normal", envelope=envelope)
+        return depths_in_gauge(round_part(size, inner=inner, standard=standard), 60, oversize)
+
+    enveloped, independent = depths(True), depths(False)
     assert enveloped.max() < 5e-5  # between the places at which heights are known
     assert (independent > 1e-3).mean() > 0.02
-    np.testing.assert_array_equal(depths_in_gauge(round_part(sizes[None], inner=inner, standard="ASME"), 60), enveloped)
-    np.testing.assert_array_equal(depths_in_gauge(round_part(sizes[None], inner=inner, standard="ISO"), 60), independent)
-    np.testing.assert_array_equal(depths_in_gauge(round_part(sizes[None], inner=inner), 60), independent)
+    assert enveloped[independent > 1e-3].min() > -1e-3  # forms are scaled until they touch the envelope
+    np.testing.assert_array_equal(depths(None, "ASME"), enveloped)
+    np.testing.assert_array_equal(depths(None, "ISO"), independent)
+    np.testing.assert_array_equal(depths(None), independent)
 
 
 def holes(tolerance, standard: str = "", own: str = "") -> tc.Assembly:
