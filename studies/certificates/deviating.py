@@ -1,7 +1,7 @@
 """Random blocks, or frusta, on each other, whose flat faces deviate: shifted and tilted within their zones.
 
-The rims of a frustum move along its slanted walls. Contact leaves them where they are nominally, which is an error of second
-order: the deviation of the face, times the slant of the walls, times the angle between the faces.
+The rims of a frustum move along its slanted walls. The simulation computes that to first order: what it leaves out is about
+the deviation of the face, times the slant of the walls, times the angle between the faces.
 """
 
 from collections.abc import Callable

@@ -2,8 +2,8 @@
 
 For each resolved realization, an interior-point solver (ipopt) looks for poses with a smaller objective. Bodies are unions of
 convex pieces; two pieces are apart if a plane lies between them, and each plane is four unknowns of the problem. One search
-starts at the resolved pose, others at random ones. Nothing is shared with the simulation but the points, areas and locators
-that define the objective.
+starts at the resolved pose, others at random ones. Nothing is shared with the simulation but the points, areas, forces and
+locators that define the objective, and how far corners of deviating faces move along normals.
 """
 
 import argparse
