@@ -4,6 +4,7 @@ import contextlib
 import ctypes
 import gc
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -46,11 +47,11 @@ GROWTH = 300 * 2**20  # bytes of memory that a process may grow by before it giv
 _memory = [0]  # of this process, when it last gave some back
 
 
-def _memory_in_use() -> int:
-    """Return the bytes of memory of this process; 0 where the system does not list them."""
-    with contextlib.suppress(OSError):
-        return 4096 * int(Path("/proc/self/statm").read_text().split()[1])
-    return 0
+def _memory_in_use() -> int | None:
+    """Return the bytes of memory of this process; None where the system does not list them."""
+    with contextlib.suppress(OSError, AttributeError):
+        return os.sysconf("SC_PAGE_SIZE") * int(Path("/proc/self/statm").read_text().split()[1])
+    return None
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -59,11 +60,12 @@ def _freed_memory():
     yield
     if sources := sys.modules.get("tests.sources"):
         sources.tree.cache_clear()
-    if _memory_in_use() > _memory[0] + GROWTH:
+    in_use = _memory_in_use()
+    if in_use is None or in_use > _memory[0] + GROWTH:
         gc.collect()
         with contextlib.suppress(OSError, AttributeError):  # the C library may be another one
             ctypes.CDLL(None).malloc_trim(0)
-        _memory[0] = _memory_in_use()
+        _memory[0] = _memory_in_use() or 0
 
 
 def pytest_addoption(parser):

@@ -5,18 +5,8 @@ import pytest
 
 import tolcontact as tc
 from studies.certificates import optima
-from studies.certificates.optima import (
-    ALL,
-    SEATING,
-    Search,
-    case_scene,
-    compared,
-    counted,
-    ends_scene,
-    judged,
-    placed_scene,
-    scene_of,
-)
+from studies.certificates.least_poses import ALL, SEATING, Search, counted
+from studies.certificates.optima import case_scene, compared, ends_scene, judged, placed_scene, scene_of
 from tests.cases.ends import case
 from tests.helpers import nightly
 

@@ -51,7 +51,7 @@ def depths_in_gauge(model: tc.Assembly, samples: int, oversize: float = 0.0) -> 
 
 @pytest.mark.parametrize(("inner", "oversize"), [(False, 0.01), *nightly((True, 0.01), (False, 0.0))])
 def test_every_part_enters_its_envelope_and_by_independency_some_do_not(inner, oversize):
-    """A pin 10.01 (0/-0.015), or a bore 10.01 (+0.015/0), with cylindricity 0.01 and a perfect gauge of 10.010."""
+    """A pin (0/-0.015) or a bore (+0.015/0) with cylindricity 0.01 about a perfect gauge of its maximum material."""
     limits = (oversize + 0.015, oversize) if inner else (oversize, oversize - 0.015)
 
     def depths(envelope: bool | None, standard: str = "") -> np.ndarray:

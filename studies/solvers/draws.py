@@ -22,7 +22,8 @@ import numpy as np
 import tolcontact as tc
 from models import ra1, ra2, tower
 from studies.cad import as1_nine
-from studies.certificates.optima import Search, case_scene, counted
+from studies.certificates.least_poses import Search, counted
+from studies.certificates.optima import case_scene
 from studies.tables import Table, write
 from tolcontact import poses as pose
 from tolcontact.compilation import Program

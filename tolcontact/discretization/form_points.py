@@ -98,8 +98,7 @@ def coaxial_points(moving: Surface, reference: Surface, deviating: Sequence[Face
     inset = END_SHARE * (end - start)
     heights = np.linspace(start + inset, end - inset, int(np.ceil((end - start) / (ALONG_SHARE * along))) + 1)
     count = max(int(np.ceil(2 * np.pi * shaft.radius / (SPACING_SHARE * across))), MIN_AZIMUTHS)
-    arm = moving.vertices[0] - shaft.origin
-    u = (arm - arm @ shaft.axis * shaft.axis) / np.linalg.norm(np.cross(arm, shaft.axis))
+    u = shaft.around_axis(moving.vertices[:1])[1][0]
     outward = [np.cos(turn) * u + np.sin(turn) * np.cross(shaft.axis, u) for turn in np.arange(count) * 2 * np.pi / count]
     points = shaft.origin + heights[:, None, None] * shaft.axis + shaft.radius * np.array(outward)
     points = points.reshape(-1, 3)

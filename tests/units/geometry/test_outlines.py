@@ -40,14 +40,14 @@ def between(upper: trimesh.Trimesh, lower: trimesh.Trimesh) -> Meeting:
     return meeting(tuple(faces), bodies, Reach(travel=40.0, tilt=0.1, spread=20.0, overlap=0.0, clearance=0.0))
 
 
-@pytest.mark.parametrize(("far", "spin"), [(1.5, 0.1), (6.0, 0.0), (25.0, 0.1)])
+@pytest.mark.parametrize("far", [1.5, 25.0])
 @pytest.mark.parametrize("seed", range(12))
-def test_the_least_gap_is_that_of_the_overlap_wherever_the_holes_are(seed, far, spin):
+def test_the_least_gap_is_that_of_the_overlap_wherever_the_holes_are(seed, far):
     rng = np.random.default_rng(seed)
     (moving, upper), (reference, lower) = plate(rng, up=True), plate(rng, up=False)
     places, poses, expected = between(moving, reference), [], []
     for _ in range(60):
-        R = Rotation.from_rotvec(rng.normal(size=3) * [0.01, 0.01, spin]).as_matrix()
+        R = Rotation.from_rotvec(rng.normal(size=3) * [0.01, 0.01, 0.1]).as_matrix()
         t = np.array([*rng.uniform(-far, far, 2), rng.uniform(-0.3, 0.3)])
         poses.append(np.r_[R.ravel(), t])
         expected.append(least_gap(upper, lower, R, t))
