@@ -53,15 +53,8 @@ class AcceptanceLimits:
         """Return whether no part has rotated, and no contact point travelled, too far (n,)."""
         return ~self._is_turned(task, state) & ~self._is_far(task, state)
 
-    def is_lost(self, task: Task, state: State) -> Bool[Array, " n"]:
-        """Return whether forces pulled a part so far away that no step will bring it back (n,)."""
-        return self._has_drifted(task, state, LOST_SIZES)
-
-    def is_adrift(self, task: Task, state: State) -> Bool[Array, " n"]:
-        """Return whether forces pulled a part away from everything that it could rest on (n,)."""
-        return self._has_drifted(task, state, ADRIFT_SIZES)
-
-    def _has_drifted(self, task: Task, state: State, sizes: float) -> np.ndarray:
+    def have_drifted(self, task: Task, state: State, sizes: float) -> Bool[Array, " n"]:
+        """Return whether forces pulled a part further away than a number of sizes of the largest part (n,)."""
         if not self._presses:
             return np.zeros(len(task), dtype=bool)
         return self.displacement(task.raw, state.poses) / self._size > sizes

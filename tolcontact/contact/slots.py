@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.contact import slots_kernel
+from tolcontact.contact import kernel
 
 MAX_CARRYING = 8  # points that keep their slots from one round to the next
 NEGLIGIBLE_SHARE = 1e-9  # of the largest multiplier of a pair: smaller ones are rounding
@@ -49,7 +49,7 @@ class Slots:
     def carrying(self, multipliers: Float[Array, "n slot"]) -> "Slots":
         """Return only the slots of active rows, at most MAX_CARRYING, the largest multipliers (n, slot) first."""
         kept = _like(self)
-        slots_kernel.keep(self.points, self.filled, multipliers, NEGLIGIBLE_SHARE, MAX_CARRYING, kept)
+        kernel.keep(self.points, self.filled, multipliers, NEGLIGIBLE_SHARE, MAX_CARRYING, kept)
         return Slots(*kept)
 
     def with_deepest(
@@ -61,7 +61,7 @@ class Slots:
         a depth of -inf means no candidate.
         """
         extended, grows = _like(self), np.empty(len(points), dtype=bool)
-        slots_kernel.extend(self.points, self.filled, self.reactions, points, depth, tolerance, fills, (*extended, grows))
+        kernel.extend(self.points, self.filled, self.reactions, points, depth, tolerance, fills, (*extended, grows))
         return Slots(*extended), grows
 
 

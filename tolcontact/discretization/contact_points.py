@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import trimesh
 
 from tolcontact.declaration import Assembly, ContactPair, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
-from tolcontact.discretization.fixed_contact import ContactPoints
+from tolcontact.discretization.fixed_contact import ContactPoints, Offsets
 from tolcontact.discretization.form_points import (
     affordable_spacing,
     check_facing,
@@ -22,10 +23,9 @@ from tolcontact.discretization.form_points import (
     with_rims,
 )
 from tolcontact.discretization.locators import Locators, NominalPart
-from tolcontact.discretization.offsets import Offsets
-from tolcontact.discretization.retained_nodes import retained_nodes
 from tolcontact.discretization.round_contact import RoundContact
 from tolcontact.discretization.scenes import Scene
+from tolcontact.elasticity import MAX_OFFSET, node_table
 from tolcontact.errors import GeometryFault
 from tolcontact.features import Features
 from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, sampling_error
@@ -40,7 +40,6 @@ DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
 FORM_POINTS = 10_000  # with form, if that resolves it
 DEFAULT_SPRINGS = 40  # which may all be active at once, so that a QP has a row for each
-KINDS = (RoundContact,)  # of contact between faces, if the model leaves the choice open; other faces have fixed points
 
 
 def contact_points(
@@ -78,13 +77,13 @@ def contact_points(
         "elastic": _bends(pair),
     }
     points: ContactPoints | None = None
-    for kind in KINDS if _is_open(pair) and not lengths else ():
-        points = points or kind.between(moving_face, reference_face, reach, rounding, common)
+    if _is_open(pair) and not lengths:
+        points = RoundContact.between(moving_face, reference_face, reach, rounding, common)
     if points is None:
         undetected = None
         candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
         if candidates is None and _is_open(pair):
-            candidates = retained_nodes((moving, reference), moving_face)
+            candidates = _retained_nodes((moving, reference), moving_face)
         if candidates is None:
             faces = moving_face, reference_face
             candidates, undetected = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths)
@@ -109,6 +108,20 @@ def _bends(pair: ContactPair) -> bool:
 def _is_open(pair: ContactPair) -> bool:
     """Return whether the model leaves the choice of points open."""
     return pair.points is None and pair.spacing is None
+
+
+def _retained_nodes(parts: Sequence[NominalPart], face: Surface) -> np.ndarray | None:
+    """Return the nodes (node, 3) of an imported stiffness matrix, where forces can act, on the `face` or projected onto it.
+
+    They belong to the first part that has a matrix; None if no part has one. Raises GeometryFault if they cannot be read.
+    """
+    for number, part in enumerate(parts):
+        elastic = part.part.elasticity
+        if elastic is not None and elastic.nodes is not None:
+            nodes = part.placed(node_table(Path(elastic.nodes)).positions)
+            on_face, _, is_over = face.project(nodes)
+            return on_face[is_over] if number else nodes[np.linalg.norm(nodes - on_face, axis=1) <= MAX_OFFSET]
+    return None
 
 
 def _candidates(

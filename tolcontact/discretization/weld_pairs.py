@@ -7,16 +7,16 @@ needs no contact point: rows of the same nodes would contradict each other by th
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import trimesh
 
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.declaration import Assembly, Joint
-from tolcontact.discretization.fixed_contact import ContactPoints
+from tolcontact.discretization.fixed_contact import ContactPoints, Offsets
 from tolcontact.discretization.locators import NominalPart
-from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.scenes import Scene
-from tolcontact.discretization.weld import Weld
 from tolcontact.elasticity import MAX_OFFSET
 from tolcontact.errors import Faults, GeometryFault, designation
 from tolcontact.features import FaceDeviation, Features
@@ -25,6 +25,25 @@ from tolcontact.geometry.tolerances import ROUNDING
 REACH = 0.1  # of the size of the other part: parts that are further apart are not welded
 PAD_POINTS = 3
 MAX_CONDITION = 1e6  # of the rows of a joint, with lengths in sizes of the part
+
+
+@dataclass(frozen=True, eq=False)
+class Weld:
+    """The rows of a joint: gaps n . (x_m - x_r) between two parts.
+
+    station             that joins the parts
+    moving, reference   indices of the parts in that station
+    P_m, P_r, n_r       (row, 3) points and directions, nominal
+    columns             (row,) inputs of a realization that hold the gaps at the end of the station
+    """
+
+    station: str
+    moving: int
+    reference: int
+    P_m: Float[Array, "row 3"]
+    P_r: Float[Array, "row 3"]
+    n_r: Float[Array, "row 3"]
+    columns: Int[Array, " row"]
 
 
 def welds_and_pairs(
