@@ -44,9 +44,8 @@ class AcceptanceLimits:
         self._max_depth = min(DEPTH_SIZES * size, DEPTH_SHARE * nominal.assembly.smallest_zone())
         self._allowed_in_form = ALLOWED_SHARE * nominal.assembly.smallest_zone()
         self._polyhedra = [k for k, pair in enumerate(self._group_pairs) if method.is_bounded and _is_polyhedron(pair)]
-        self._round = {}
-        for k in curved_pairs(nominal, group):
-            self._round[k] = (self._group_pairs[k].curvature, *_ball(self._group_pairs[k].P_m))
+        curved = ((k, self._group_pairs[k]) for k in curved_pairs(nominal, group))
+        self._round = {k: (pair.curvature, *_ball(pair.P_m)) for k, pair in curved}
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
     def is_near(self, task: Task, state: State) -> Bool[Array, " n"]:
@@ -66,32 +65,33 @@ class AcceptanceLimits:
         part by more than the depth of its gaps over the size of its face. If parts only travelled, perhaps so far that contact
         points were missed, the faces must not penetrate each other, and the active points must lie on them.
         """
-        doubtful = self._is_turned(task, state)
-        if not self._presses:
-            for k, search in candidates.bounded.items():
-                doubtful |= pose.turn(state.relative[:, k], task.relative[:, k]) > TURN_FACTOR * search.meeting.turn
-        far = self._is_far(task, state)
+        doubtful, far = self._is_turned(task, state), self._is_far(task, state)
         for k, search in candidates.bounded.items():
+            if not self._presses:
+                doubtful |= pose.turn(state.relative[:, k], task.relative[:, k]) > TURN_FACTOR * search.meeting.turn
             far |= ~search.meeting.reaches(state.relative[:, k])
         rows = np.flatnonzero(far & ~doubtful & state.solved & ~state.in_conflict)
         travelled = state.take(rows)
         for k, index in enumerate(self._pairs):
             faces, X_RM = self._nominal.face_pair(index) if rows.size else None, travelled.relative[:, k]
-            if faces is not None:
-                carriers = candidates.carriers(k, travelled)
-                for side, motion, points in (
-                    (faces.reference, X_RM, carriers.on_moving),
-                    (faces.moving, pose.inverse(X_RM), ~carriers.on_moving),
-                ):
-                    realization = carriers.realization[points]
-                    overhang = side.face.overhang(pose.apply(motion[realization], carriers.places[points, None])[:, 0])
-                    doubtful[rows[realization[overhang > carriers.spacing]]] = True
-                pair, deviations = self._group_pairs[k], task.deviations[rows]
-                if pair.is_springy:  # compliant faces penetrate each other
-                    continue
-                depth = faces.depth(X_RM, pair.heights(deviations), pair.form(deviations))
-                doubtful[rows] |= depth > self.allowed(k)
+            if faces is None:
+                continue
+            carriers = candidates.carriers(k, travelled)
+            for side, motion, points in (
+                (faces.reference, X_RM, carriers.on_moving),
+                (faces.moving, pose.inverse(X_RM), ~carriers.on_moving),
+            ):
+                realization = carriers.realization[points]
+                overhang = side.face.overhang(pose.apply(motion[realization], carriers.places[points, None])[:, 0])
+                doubtful[rows[realization[overhang > carriers.spacing]]] = True
+            if not self._group_pairs[k].is_springy:  # compliant faces penetrate each other
+                doubtful[rows] |= self._depth(k, X_RM, task.deviations[rows]) > self.allowed(k)
         return doubtful
+
+    def _depth(self, k: int, X_RM: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        """Return how deep the faces of pair k of the group penetrate each other (n,) [mm]; 0 for locators, without faces."""
+        pair, faces = self._group_pairs[k], self._nominal.face_pair(self._pairs[k])
+        return np.zeros(len(X_RM)) if faces is None else faces.depth(X_RM, pair.heights(deviations), pair.form(deviations))
 
     def lie_in_form(self, task: Task, state: State) -> Bool[Array, " n"]:
         """Return whether faces with form interfere in a certified answer (n,), where no search finds the deepest place.
@@ -100,19 +100,14 @@ class AcceptanceLimits:
         """
         found, rows = np.zeros(len(state), dtype=bool), np.flatnonzero(state.certified)
         for k in self._polyhedra if rows.size else ():
-            pair, faces, deviations = self._group_pairs[k], self._nominal.face_pair(self._pairs[k]), task.deviations[rows]
-            if faces is not None:
-                depth = faces.depth(state.relative[rows, k], pair.heights(deviations), pair.form(deviations))
-                found[rows] |= depth > self._allowed_in_form
+            found[rows] |= self._depth(k, state.relative[rows, k], task.deviations[rows]) > self._allowed_in_form
         return found
 
     def _is_turned(self, task: Task, state: State) -> Bool[Array, " n"]:
-        """Return whether a part rotated too far from its raw pose (n,)."""
         difference = state.poses[:, self._movers, :9] - task.raw[:, self._movers, :9]
         return ((difference**2).sum(axis=2) > self._max_turn).any(axis=1)
 
     def _is_far(self, task: Task, state: State) -> Bool[Array, " n"]:
-        """Return whether a contact point may be too far from its raw place (n,)."""
         return self.displacement(task.raw, state.poses) > self._max_travel
 
     def allowed(self, k: int) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.bounded_search import FREE_SHARE, BoundedSearch
+from tolcontact.contact.bounded_search import FREE_SHARE, BoundedSearch, Guard
 from tolcontact.contact.fixed_search import MIN_BULGE, Carriers, FixedSearch, Search, StandingSearch
 from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
@@ -51,11 +51,10 @@ class Candidates:
         self.free_depth = FREE_SHARE * smallest
         self._allowed_bulge = max(ALLOWED_SHARE * smallest, 2 * MIN_BULGE)
         self.ceiling = CEILING_SHARE * max((pair.meeting.size for pair in self.bounded.values()), default=0.0)
-        guards = {k: pair.guard for k, pair in self.bounded.items() if pair.guard is not None}
-        of_bodies = {id(guard.neighbours): k for k, guard in reversed(guards.items())}
-        self.guards = {k: guards[k] for k in sorted(of_bodies.values())}
-        for k in self.guards:
-            self.bounded[k].adds_guard = True
+        self.guards: dict[int, Guard] = {}
+        for k, pair in self.bounded.items():
+            if pair.guard is not None and all(pair.guard.neighbours is not guard.neighbours for guard in self.guards.values()):
+                self.guards[k], pair.adds_guard = pair.guard, True
 
     def scans(
         self,

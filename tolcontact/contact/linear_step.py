@@ -96,8 +96,10 @@ class LinearStep:
                 rows, slots = rows[enters], [new.take(enters) for new in slots]
                 part = (task.take(rows), state.take(rows))
                 part_inputs = {name: values[rows] for name, values in inputs.items()}
-            if newton:
-                self._set_reactions(part_inputs, [old.take(rows) for old in start_slots], slots)
+            if newton:  # the points in the slots have the reactions from the start of the step
+                part_inputs["reactions"] = part_inputs["reactions"].copy()
+                for k, old, new in zip(self.varying, start_slots, slots, strict=True):
+                    part_inputs["reactions"][:, self.spans[k]] = old.take(rows).reactions_of(new.points)
             deepest, size[:, rows] = self._solve_round(*part, part_inputs, slots)
             slots = part[1].slots
             if part[1] is not state:
@@ -114,12 +116,6 @@ class LinearStep:
             inputs["reactions"] = _cleared(inputs["reactions"], self.spans)
             bends[1:] = [_bend(task.scans[k], old, task.deviations) for k, old in zip(self.varying, slots, strict=True)]
         return inputs | {"bend": np.concatenate(bends, axis=1)}
-
-    def _set_reactions(self, inputs: dict[str, np.ndarray], start_slots: Sequence[Slots], slots: Sequence[Slots]) -> None:
-        """Set the reactions of the points in the slots to those that they had at the start of the step."""
-        inputs["reactions"] = inputs["reactions"].copy()
-        for k, old, new in zip(self.varying, start_slots, slots, strict=True):
-            inputs["reactions"][:, self.spans[k]] = old.reactions_of(new.points)
 
     def _solve_round(
         self, task: Task, state: State, inputs: Mapping[str, np.ndarray], slots: Sequence[Slots]

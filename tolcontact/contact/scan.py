@@ -166,11 +166,9 @@ class FixedScan(Scan):
     def _nominal_points(self) -> kernel.Points:
         """The points without the heights that deviations add."""
         points, size = self.points, self.points.basis.shape[1]
-        leaf_boxes, branch_boxes = (
-            np.ascontiguousarray(boxes[:, : size - 1]) for boxes in (points.leaf_boxes, points.branch_boxes)
-        )
-        return points._replace(
-            columns=points.columns[:0], coordinates=points.coordinates[:size], leaf_boxes=leaf_boxes, branch_boxes=branch_boxes
+        boxes = (np.ascontiguousarray(boxes[:, : size - 1]) for boxes in (points.leaf_boxes, points.branch_boxes))
+        return kernel.Points(
+            points.basis, points.columns[:0], points.coordinates[:size], points.leaves, points.branches, *boxes
         )
 
     @cached_property

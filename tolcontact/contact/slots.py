@@ -48,7 +48,7 @@ class Slots:
 
     def carrying(self, multipliers: Float[Array, "n slot"]) -> "Slots":
         """Return only the slots of active rows, at most MAX_CARRYING, the largest multipliers (n, slot) first."""
-        kept = _like(self)
+        kept = np.empty_like(self.points), np.empty_like(self.filled), np.empty_like(self.reactions)
         kernel.keep(self.points, self.filled, multipliers, NEGLIGIBLE_SHARE, MAX_CARRYING, kept)
         return Slots(*kept)
 
@@ -60,11 +60,7 @@ class Slots:
         Returns also whether any candidate that is inside is new, (n,). If it `fills`, candidates outside follow those inside;
         a depth of -inf means no candidate.
         """
-        extended, grows = _like(self), np.empty(len(points), dtype=bool)
+        extended = np.empty_like(self.points), np.empty_like(self.filled), np.empty_like(self.reactions)
+        grows = np.empty(len(points), dtype=bool)
         kernel.extend(self.points, self.filled, self.reactions, points, depth, tolerance, fills, (*extended, grows))
         return Slots(*extended), grows
-
-
-def _like(slots: Slots) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return arrays for points, filled and reactions of as many slots."""
-    return np.empty_like(slots.points), np.empty_like(slots.filled), np.empty_like(slots.reactions)

@@ -22,7 +22,7 @@ from tolcontact.discretization.form_points import (
     form_spacing,
     with_rims,
 )
-from tolcontact.discretization.locators import Locators, NominalPart
+from tolcontact.discretization.locators import NominalPart
 from tolcontact.discretization.round_contact import RoundContact
 from tolcontact.discretization.scenes import Scene
 from tolcontact.elasticity import MAX_OFFSET, node_table
@@ -221,18 +221,25 @@ def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> It
     """
     start = 0
     for index, part in enumerate(parts):
-        locators, owners = part.locators, np.array(part.owners or (index,) * len(part.locators), dtype=int)
+        locators, first = part.locators, start
+        start += len(locators)
+        if not part.free:
+            continue
+        owners = np.array(part.owners or (index,) * len(locators), dtype=int)
         scene = next(scene for scene in scenes if scene.station == part.station)
-        for owner in np.unique(owners[locators.one_sided]) if part.free else ():
+        for owner in np.unique(owners[locators.one_sided]):
             supports = np.flatnonzero(locators.one_sided & (owners == owner))
             name, elastic = scene.supports_name(parts[owner].part), bool(locators.elastic.any())
-            yield _locator_pair(part, name, int(owner), start, supports, elastic=elastic)
-        for number in np.flatnonzero(locators.elastic & ~locators.one_sided) if part.free else ():
+            yield _locator_pair(part, name, int(owner), first, supports, elastic=elastic)
+        for number in np.flatnonzero(locators.elastic & ~locators.one_sided):
             label, owner, point = locators.labels[number], int(owners[number]), np.array([number])
-            yield _locator_pair(part, label, owner, start, point, holds=True, elastic=True)
-        for number in np.flatnonzero(locators.springy & ~locators.one_sided & ~locators.elastic) if part.free else ():
-            yield _spring_pair(_locator_pair(part, locators.labels[number], int(owners[number]), start, np.array([number])))
-        start += len(locators)
+            yield _locator_pair(part, label, owner, first, point, holds=True, elastic=True)
+        for number in np.flatnonzero(locators.springy & ~locators.one_sided & ~locators.elastic):
+            # A compliant two-sided locator is a spring that pushes and one that pulls, at the same point.
+            locator = _locator_pair(part, locators.labels[number], int(owners[number]), first, np.array([number]))
+            pair, signs = locator.take(np.array([0, 0])), np.array([1.0, -1.0])
+            offsets = Offsets(pair.offsets.columns, pair.offsets.matrix * signs)
+            yield replace(pair, n_r=signs[:, None] * pair.n_r, offsets=offsets, pulls=signs < 0)
 
 
 def _locator_pair(
@@ -240,30 +247,13 @@ def _locator_pair(
 ) -> ContactPoints:
     """Return some locators of a part, by their numbers, as a pair."""
     locators = part.locators
-    P, n, stiffness = (
-        values[numbers]
-        for values in (locators.points, locators.directions, np.where(locators.springy, locators.stiffness, np.inf))
-    )
-    offsets, of_all = _support_offsets(locators, start, numbers), start + numbers
-    return ContactPoints(
-        name, owner, part.parent, P, P, n, offsets, locators=of_all, stiffness=stiffness, holds=holds, elastic=elastic
-    )
-
-
-def _spring_pair(locator: ContactPoints) -> ContactPoints:
-    """Return a compliant two-sided locator as a pair: a spring that pushes and one that pulls, at the same point."""
-    both, signs = locator.take(np.array([0, 0])), np.array([1.0, -1.0])
-    offsets = Offsets(both.offsets.columns, both.offsets.matrix * signs)
-    return replace(both, n_r=signs[:, None] * both.n_r, offsets=offsets, pulls=signs < 0)
-
-
-def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Offsets:
-    """Return the heights of supports: their own deviations, columns `start` on, and deviations of the faces they touch."""
-    offsets = [Offsets(start + supports, np.eye(len(supports)))]
-    for place, number in enumerate(supports):
+    P, n, stiffness = locators.points[numbers], locators.directions[numbers], locators.stiffness[numbers]
+    terms = [Offsets(start + numbers, np.eye(len(numbers)))]  # their own deviations, and deviations of the faces they touch
+    for place, number in enumerate(numbers):
         columns, factors = locators.pushes(number)
         if columns.size:
-            matrix = np.zeros((len(columns), len(supports)))
-            matrix[:, place] = factors
-            offsets.append(Offsets(columns, matrix))
-    return Offsets.joined(offsets, len(supports))
+            terms.append(Offsets(columns, np.outer(factors, np.arange(len(numbers)) == place)))
+    return ContactPoints(
+        name, owner, part.parent, P, P, n, Offsets.joined(terms, len(numbers)), locators=start + numbers,
+        stiffness=np.where(locators.springy[numbers], stiffness, np.inf), holds=holds, elastic=elastic,
+    )  # fmt: skip

@@ -36,16 +36,15 @@ class LocatingFace:
     outward: np.ndarray
 
     @classmethod
-    def of(cls, face: Face, meshes: Meshes) -> "LocatingFace":
-        """Return a face in its part's own frame."""
+    def of(cls, face: Face, meshes: Meshes, placement: Placement | None = None) -> "LocatingFace":
+        """Return a face in its part's own frame, or with a placement of the part."""
         mesh = patch(face, meshes).mesh
-        normal = mesh.area_faces @ mesh.face_normals
-        return cls(str(face), np.asarray(mesh.vertices), np.asarray(mesh.faces), normal / np.linalg.norm(normal))
-
-    def moved(self, placement: Placement) -> "LocatingFace":
-        """Return the face after a motion."""
-        R, t = placement
-        return LocatingFace(self.name, self.vertices @ R.T + t, self.faces, R @ self.outward)
+        vertices, normal = np.asarray(mesh.vertices), mesh.area_faces @ mesh.face_normals
+        outward = normal / np.linalg.norm(normal)
+        if placement is not None:
+            R, t = placement
+            vertices, outward = vertices @ R.T + t, R @ outward
+        return cls(str(face), vertices, np.asarray(mesh.faces), outward)
 
     @property
     def axes(self) -> np.ndarray:

@@ -23,7 +23,6 @@ from tolcontact.declaration import (
 )
 from tolcontact.discretization.form_points import affordable_spacing, form_lengths, with_rims
 from tolcontact.discretization.measured_geometry import (
-    Axis,
     AxisPair,
     Combined,
     Crossing,
@@ -88,9 +87,8 @@ def face_gap(moving: MeasuredFace, reference: MeasuredFace, is_largest: bool) ->
 def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
     """Return points (place, 3) of the moving face over the reference face, including the rim of the common region."""
     surface, lengths = moving.surface, form_lengths([moving.deviation, reference.deviation])
-    spacing = (
-        affordable_spacing(lengths, surface.mesh.area, FORM_PLACES) if lengths else (surface.mesh.area / DEFAULT_PLACES) ** 0.5
-    )
+    area = surface.mesh.area
+    spacing = affordable_spacing(lengths, area, FORM_PLACES) if lengths else (area / DEFAULT_PLACES) ** 0.5
     places = spread(surface.mesh, None, spacing)
     share = float(reference.surface.project(places)[2].mean())
     if not lengths and share < 1:
@@ -98,8 +96,7 @@ def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
         places = spread(surface.mesh, None, spacing)
     if surface.is_flat and reference.surface.is_flat:
         places = np.concatenate([places, overlap_corners(surface, reference.surface)])
-        reach = float(np.ptp(np.vstack([surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
-        places = with_rims(places, surface, reference.surface, spacing, reach)
+        places = with_rims(places, surface, reference.surface, spacing, _extent(moving, reference))
     places = places[reference.surface.project(places)[2]]
     if len(places) and surface.surfaces:
         places, _, _ = surface.project(places)  # from triangles onto the round face that they approximate
@@ -176,12 +173,12 @@ def _lines(nominal: Nominal, number: int, measurements: Mapping[str, NominalMeas
 
 
 def _gap(gap: Gap, faces: MeasuredFaces) -> Heights:
-    face, point, nominal = faces[gap.face], gap.station, faces.nominal
-    position, deviation = nominal.position(point), nominal.face_at(point)
-    measured_point = MeasuredPoint(nominal.part_index(point.part), position, deviation, nominal.outward(point))
-    _check_varies([gap.station.part, gap.face.part], [measured_point.deviation, face.deviation])
+    face, station, nominal = faces[gap.face], gap.station, faces.nominal
+    position, deviation = nominal.position(station), nominal.face_at(station)
+    _check_varies([station.part, gap.face.part], [deviation, face.deviation])
+    point = MeasuredPoint(nominal.part_index(station.part), position, deviation, nominal.outward(station))
     wall = face.wall(position)
-    return Heights(np.array([[position, wall.foot(position)]]), [(measured_point, wall)])
+    return Heights(np.array([[position, wall.foot(position)]]), [(point, wall)])
 
 
 def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement:
@@ -194,26 +191,26 @@ def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement
             )
     if moving.surface.is_flat and reference.surface.is_flat:
         return _clearance_of_planes(moving, reference)
-    reach = float(np.ptp(np.vstack([moving.surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
-    if points := round_points(moving.surface, reference.surface, reach):
+    if points := round_points(moving.surface, reference.surface, _extent(moving, reference)):
         rows = [point.nominal() for point in points]
         P_m, P_r, _ = min(rows, key=lambda row: float((row[0] - row[1]) @ row[2]))
         return RoundClearance(np.array([[P_m, P_r]]), moving, reference, RoundPoints.of(points))
-    if all(_is_outer_cylinder(face) for face in (moving, reference)):
+    pieces = [face.surface.only_piece for face in (moving, reference)]
+    if all(piece is not None and isinstance(piece.surface, Cylinder) and not piece.is_hollow for piece in pieces):
         axes = moving.axis, reference.axis
-        return AxisPair(_nearest_places(moving.axis.ends, reference.axis.ends)[None], *axes, is_between_surfaces=True)
+        return AxisPair(_nearest_places(axes[0].ends, axes[1].ends)[None], *axes, is_between_surfaces=True)
     return _clearance_of_meshes(moving, reference)
+
+
+def _extent(moving: MeasuredFace, reference: MeasuredFace) -> float:
+    """Return a distance [mm] that is larger than any between two faces."""
+    return float(np.ptp(np.vstack([moving.surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
 
 
 def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> MeshClearance:
     """Return the clearance between triangles. Raises GeometryFault if too many of them are near each other."""
-    distances = [
-        np.linalg.norm(target.surface.nearest(corners)[1] - corners, axis=1).min()
-        for target, corners in (
-            (reference, moving.surface.vertices),
-            (moving, reference.surface.vertices),
-        )
-    ]
+    sides = (reference, moving.surface.vertices), (moving, reference.surface.vertices)
+    distances = [np.linalg.norm(target.surface.nearest(corners)[1] - corners, axis=1).min() for target, corners in sides]
     try:
         elements = nearest_elements(moving.surface.mesh, reference.surface.mesh, float(min(distances)))
     except GeometryFault as fault:
@@ -249,10 +246,8 @@ def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heigh
             "the gap of a point with tc.Gap"
         )
     shortest = min(lines, key=lambda line: float(np.linalg.norm(line[1] - line[0])))
-    heights, outlines = (
-        Heights(np.array([shortest]), points, crossings),
-        (Outline.of(moving.surface), Outline.of(reference.surface)),
-    )
+    heights = Heights(np.array([shortest]), points, crossings)
+    outlines = Outline.of(moving.surface), Outline.of(reference.surface)
     if len(outlines[0].edges) * len(outlines[1].edges) > MAX_EDGE_PAIRS:
         return heights
     return PlaneClearance(heights.lines, moving, reference, (moving.plane, reference.plane), outlines, heights)
@@ -276,18 +271,13 @@ def _axis_distance(distance: AxisDistance, faces: MeasuredFaces) -> AxisPair:
                 raise GeometryFault(
                     f"the axis of {face} is parallel to the plane that is to cut it; choose another direction across"
                 )
-        foot = reference.midpoint + _slide(reference, n, moving.midpoint)
+        slide = reference.direction if reference.direction.any() else n  # along the axis; for a centre, along n
+        foot = reference.midpoint + slide * float((moving.midpoint - reference.midpoint) @ n) / float(slide @ n)
         return AxisPair(np.concatenate([lines, [[moving.midpoint, foot]]]), moving, reference, across=n)
     if distance.along is not None:
         foot = reference.midpoint + ((moving.midpoint - reference.midpoint) @ reference.direction) * reference.direction
         return AxisPair(np.concatenate([lines, [[moving.midpoint, foot]]]), moving, reference, along=np.array(distance.along))
     return AxisPair(np.concatenate([lines, [_nearest_places(moving.ends, reference.ends)]]), moving, reference)
-
-
-def _slide(axis: Axis, n: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return the vector (3,) along an axis, or for a centre along n, to the plane across n through a point (3,)."""
-    direction = axis.direction if axis.direction.any() else n
-    return np.asarray(direction * float((place - axis.midpoint) @ n) / float(direction @ n))
 
 
 def _angle(angle: Angle, faces: MeasuredFaces) -> DirectionPair:
@@ -313,11 +303,6 @@ def _check_varies(parts: Iterable[Any], deviations: Iterable[Any]) -> None:
             f'it is measured within part "{part.name}", whose faces there do not deviate, so it is constant; take faces of two '
             "parts, or features with tolerances"
         )
-
-
-def _is_outer_cylinder(face: MeasuredFace) -> bool:
-    piece = face.surface.only_piece
-    return piece is not None and isinstance(piece.surface, Cylinder) and not piece.is_hollow
 
 
 def _kind(face: MeasuredFace) -> str:

@@ -70,19 +70,17 @@ def welds_and_pairs(
                 inputs += len(made[0].columns)
                 later = [other for other in scenes[number + 1 :] if joint.welded[0] in other.assembly.parts]
                 holding += [*made[1], *(_kept(joint, made[0], scene) for scene in later)]
-    free = [faults.attempt(f'contact pair "{pair.name}"', _without_held_points, pair, holding) for pair in pairs]
+    free = []
+    for pair in pairs:
+        held = [
+            other.P_m if other.moving == pair.moving else other.P_r
+            for other in holding
+            if {other.moving, other.reference} == {pair.moving, pair.reference}
+        ]
+        place = f'contact pair "{pair.name}"'
+        free.append(faults.attempt(place, pair.without, np.concatenate(held), MAX_OFFSET) if held else pair)
     faults.refuse(line.name)
     return tuple(welds), (*free, *holding)
-
-
-def _without_held_points(pair: ContactPoints, holding: Sequence[ContactPoints]) -> ContactPoints:
-    """Return a pair without its contact points where guns or welds hold its parts. Raises GeometryFault if it has no others."""
-    held = [
-        other.P_m if other.moving == pair.moving else other.P_r
-        for other in holding
-        if {other.moving, other.reference} == {pair.moving, pair.reference}
-    ]
-    return pair.without(np.concatenate(held), MAX_OFFSET) if held else pair
 
 
 def _weld(
