@@ -48,8 +48,7 @@ class ContactResolver:
         self._force = sum(float(np.linalg.norm(load.vector)) for load in group.group.loads) or 1.0
         self.contact_points = [program.nominal.pairs[index] for index in group.group.pairs]
         self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
-        size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
-        self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size, max_turn)
+        self._limits = AcceptanceLimits(program, group.group, self._candidates, max_turn)
         self._free_steps = FreeSteps(group.group, self._candidates, self._limits, self._relate, self._energy_of)
 
     def twin(self) -> "ContactResolver":
@@ -140,7 +139,9 @@ class ContactResolver:
         else:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = start.projected
-        self._leave_adrift(task, state)
+        adrift = self._limits.have_drifted(task, state, ADRIFT_SIZES)  # nothing holds a part against its forces
+        state.kkt_residual[adrift], state.slack[adrift], state.multipliers[adrift] = np.inf, 0, 0
+        state.poses[adrift], state.relative[adrift] = task.raw[adrift], task.relative[adrift]
         at_rest = Search(start, ceilings=None if start.free else np.full(len(state), self._candidates.ceiling))
         scans = self._candidates.scans(state.relative, task.deviations, at_rest, slots=state.slots, earlier=task.scans)
         task = replace(task, scans=scans)
@@ -149,14 +150,14 @@ class ContactResolver:
             depth = undone(task.scans, state.gap_min, state.relative, task.deviations, task.may_carry, state.slack)
             self._check_springs(task, state, depth)
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
-        state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
+        state.doubtful[:] = self._limits.is_doubtful(task, state)
         certified = np.flatnonzero(state.certified)
         state.doubtful[certified] = self._candidates.interfere(state.relative[certified])
         state.doubtful[:] |= self._candidates.are_apart(state) & state.certified
         state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & state.certified
         state.doubtful[:] |= self._limits.lie_in_form(task, state)
         if not start.projected:
-            self._doubt_rolled(task, state)
+            state.doubtful[:] |= self._limits.have_rolled(task, state)
 
     def _check_springs(self, task: Task, state: State, depth: Float[Array, "n pair"]) -> None:
         """Write into `depth` [mm] how far compliant pairs miss their law, and the gaps between bent parts into the state.
@@ -180,22 +181,6 @@ class ContactResolver:
                 state.gap_min[:, k] = gaps.min(axis=1)
                 misfits = gaps if pair.holds else np.minimum(gaps, reactions * np.diag(flexibility.C)[span])
             depth[:, k] = np.abs(misfits).max(axis=1) - state.slack[:, k]
-
-    def _leave_adrift(self, task: Task, state: State) -> None:
-        """Reset realizations to their raw poses if nothing holds a part against its forces."""
-        adrift = self._limits.have_drifted(task, state, ADRIFT_SIZES)
-        state.kkt_residual[adrift], state.slack[adrift], state.multipliers[adrift] = np.inf, 0, 0
-        state.poses[adrift], state.relative[adrift] = task.raw[adrift], task.relative[adrift]
-
-    def _doubt_rolled(self, task: Task, state: State) -> None:
-        """Mark answers as doubtful if contact points slid along tangent planes into a curved face."""
-        for k in self._candidates.curved:
-            rolled = np.flatnonzero(self._limits.rolled(k, state))
-            if rolled.size:
-                relative = state.relative[rolled, k]
-                scan = self._candidates.pairs[k].projected(relative)
-                depth = -scan.min_gap(relative, task.deviations[rolled])
-                state.doubtful[rolled] |= depth > self._limits.allowed(k)
 
     def _rescue(self, task: Task, state: State, raw_gap: Float[Array, "n pair"]) -> None:
         """Try realizations again from other starts (see RESCUES), and keep the better answers.

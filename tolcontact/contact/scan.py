@@ -101,7 +101,7 @@ class FixedScan(Scan):
     ) -> Float[Array, "realization point"]:
         """Return gaps (realization, point) [mm]; infinite ones of leaves where all are above `limits` (realization,) [mm].
 
-        raised   the heights of the points, if they are known; otherwise they follow from the deviations
+        The heights of the points are `raised`, if they are known; otherwise they follow from the deviations.
         """
         gaps = np.empty((len(relative), len(self.pair.P_m)))
         limits = np.full(len(relative), np.inf) if limits is None else limits
@@ -144,10 +144,7 @@ class FixedScan(Scan):
     ) -> tuple[Int[Array, "realization cluster"], Float[Array, "realization cluster"]]:
         """Return index and gap [mm] of the deepest point of each cluster, if its gap is less than `limit` [mm].
 
-        Otherwise these are the first point of the cluster, and `limit`.
-
-        clusters   (cluster + 1,): the first branch of each cluster, and the end
-        raised     the heights of the points, if they are known; otherwise they follow from the deviations
+        Otherwise these are the first point of the cluster, and `limit`. `clusters` and `raised` are as above.
         """
         points = np.empty((len(relative), len(clusters) - 1), dtype=np.int64)
         gaps = np.empty(points.shape)
@@ -247,11 +244,9 @@ def project(scan: FixedScan, relative: Float[Array, "realization 12"], margin: f
 def pair_scan(
     pair: ContactPoints, gaps: GapMap, tables: Sequence[np.ndarray], clusters: int, points: np.ndarray | None = None
 ) -> FixedScan:
-    """Sort the points of a pair into at most `clusters` clusters of neighbours, and each cluster into branches and leaves.
+    """Sort some points (point,) of a pair, or all, into at most `clusters` clusters of neighbours, branches and leaves.
 
     Each support has its own cluster.
-
-    points   indices (point,) of the points of the scan; all if it is None
     """
     points = np.arange(len(pair.P_m)) if points is None else points
     label = cluster_labels(pair.P_m[points], len(points) if pair.is_supports else clusters)
@@ -317,8 +312,7 @@ def undone(
 ) -> Float[Array, "realization pair"]:
     """Return the penetration beyond the slack of points that may be active (realization, pair) [mm].
 
-    min_gap     (realization, pair) [mm]: the smallest gaps of all points
-    may_carry   for each pair (realization, point), or None if all points may
+    The smallest gaps `min_gap` are of all points; `may_carry` has for each pair (realization, point), or None if all may.
     """
     depths = [
         -min_gap[:, k] if may is None else scan.deepest(relative[:, k], deviations, may).depth.max(axis=1)

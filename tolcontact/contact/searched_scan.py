@@ -193,10 +193,9 @@ class RaisedScan(Scan):
         """
         assert pair.minima is not None
         if is_raw:
-            is_clear = self.min_gap(relative, deviations) >= 0
-            if not is_clear.any():
+            rows = np.flatnonzero(self.min_gap(relative, deviations) >= 0)
+            if not rows.size:
                 return self
-            rows = np.flatnonzero(is_clear)
             found = self.take(rows).with_minima(pair, relative[rows], deviations[rows], depth).minima
             every = SearchedPlaces.none(len(relative), found.labels.shape[1])
             for values, of_clear in zip(every, found, strict=True):

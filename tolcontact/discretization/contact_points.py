@@ -11,17 +11,8 @@ import trimesh
 
 from tolcontact.declaration import Assembly, ContactPair, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
+from tolcontact.discretization import form_points
 from tolcontact.discretization.fixed_contact import ContactPoints, Offsets
-from tolcontact.discretization.form_points import (
-    affordable_spacing,
-    check_facing,
-    check_resolved,
-    coaxial_points,
-    facing_triangles,
-    form_lengths,
-    form_spacing,
-    with_rims,
-)
 from tolcontact.discretization.locators import NominalPart
 from tolcontact.discretization.round_contact import RoundContact
 from tolcontact.discretization.scenes import Scene
@@ -58,12 +49,12 @@ def contact_points(
         features.deviation(pair.moving, meshes, moving.placement),
         features.deviation(pair.reference, meshes, reference.placement),
     )
-    lengths = form_lengths(deviating)
+    lengths = form_points.form_lengths(deviating)
     if lengths:
-        triangles = facing_triangles(moving_face, reference_face, deviating[1])
+        triangles = form_points.facing_triangles(moving_face, reference_face, deviating[1])
         unplaced, moving_face = unplaced.part(triangles), moving_face.part(triangles)
-        reference_face = reference_face.part(facing_triangles(reference_face, moving_face, deviating[0]))
-        check_facing(moving_face, reference_face, deviating)
+        reference_face = reference_face.part(form_points.facing_triangles(reference_face, moving_face, deviating[0]))
+        form_points.check_facing(moving_face, reference_face, deviating)
     rounding = coordinate_error(moving.mesh) + coordinate_error(reference.mesh)
     common: dict[str, Any] = {
         "name": pair.name,
@@ -81,7 +72,7 @@ def contact_points(
         points = RoundContact.between(moving_face, reference_face, reach, rounding, common)
     if points is None:
         undetected = None
-        candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
+        candidates = form_points.coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
         if candidates is None and _is_open(pair):
             candidates = _retained_nodes((moving, reference), moving_face)
         if candidates is None:
@@ -144,20 +135,20 @@ def _candidates(
         points = unique_points(np.asarray(mesh.vertices))
     else:
         is_fine = lengths and _is_open(pair)
-        spacing = affordable_spacing(lengths, float(mesh.area), FORM_POINTS) if is_fine else pair.spacing
+        spacing = form_points.affordable_spacing(lengths, float(mesh.area), FORM_POINTS) if is_fine else pair.spacing
         open_count = DEFAULT_POINTS if pair.stiffness is None and not _bends(pair) else DEFAULT_SPRINGS
         count = open_count if _is_open(pair) else pair.points
         if spacing is not None:
             _check_number(mesh.area / spacing**2, f"a spacing of {spacing:g} mm gives")
         points = spread(mesh, count if spacing is None else None, spacing)
     if lengths:
-        check_resolved(points, mesh, lengths)
+        form_points.check_resolved(points, mesh, lengths)
     P_m, finest = moving.placed(points), assembly.smallest_zone()
     if moving_face.is_flat and reference_face.is_flat:
         if _is_open(pair):
             P_m = np.concatenate([P_m, overlap_corners(moving_face, reference_face)])
             if lengths:
-                P_m = with_rims(P_m, moving_face, reference_face, form_spacing(lengths), reach)
+                P_m = form_points.with_rims(P_m, moving_face, reference_face, form_points.form_spacing(lengths), reach)
     elif math.isfinite(finest):
         P_m, undetected = _with_curvature(moving_face, reference_face, P_m, finest, reach, is_open=_is_open(pair))
     P_m = distinct(P_m, ROUNDING * moving.mesh.scale)

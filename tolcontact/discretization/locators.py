@@ -169,7 +169,8 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     outside the material of the face moves to where the support is widest (see LocatingFace). Raises GeometryFault if the three
     faces are not independent, or the inset leaves no room.
     """
-    faces = [LocatingFace.of(face, meshes, at) for face, at in zip(scheme.faces, placements or [None] * 3, strict=True)]
+    of_faces: Sequence[Placement | None] = placements or [None] * 3
+    faces = [LocatingFace.of(face, meshes, placement) for face, placement in zip(scheme.faces, of_faces, strict=True)]
     outward = np.array([face.outward for face in faces])
     if abs(np.linalg.det(outward)) < MIN_DETERMINANT:
         raise GeometryFault(

@@ -125,7 +125,11 @@ def _pieces(face: Surface) -> list[Piece]:
 
     Raises NotRoundError if a part of the face is neither flat nor on an analytic surface.
     """
-    pieces = [_with_outward_normal(piece) for piece in face.pieces]
+    pieces = []
+    for piece in face.pieces:
+        plane = piece.surface
+        is_inward = isinstance(plane, Plane) and piece.is_hollow
+        pieces.append(Piece(Plane(plane.origin, -plane.axis), False, piece.face) if is_inward else piece)
     remainder = face.unknown
     if not len(remainder.mesh.faces):
         return pieces
@@ -144,13 +148,6 @@ def _pieces(face: Surface) -> list[Piece]:
         n = (np.asarray(flat.mesh.face_normals) * np.asarray(flat.mesh.area_faces)[:, None]).sum(axis=0)
         pieces.append(Piece(Plane(flat.vertices[0], n / np.linalg.norm(n)), False, flat))
     return pieces
-
-
-def _with_outward_normal(piece: Piece) -> Piece:
-    plane = piece.surface
-    if not isinstance(plane, Plane) or not piece.is_hollow:
-        return piece
-    return Piece(Plane(plane.origin, -plane.axis), False, piece.face)
 
 
 def _points_between(moving: Piece, reference: Piece, reach: float) -> list[RoundPoint]:
