@@ -84,28 +84,26 @@ class FixedScan(Scan):
     points     as compiled passes take them
     clusters   (cluster + 1,): the first branch of each cluster, and the end
     tables     moment tables (moment, point) of the sides that enter the objective
+    raised     the heights of the points, if they are known; otherwise they follow from the deviations
     """
 
     pair: ContactPoints
     points: kernel.Points
     clusters: Int[Array, " _"]
     tables: tuple[Float[Array, "moment point"], ...]
+    raised: kernel.Raised = NOT_RAISED
 
     def gaps(
         self,
         relative: Float[Array, "realization 12"],
         deviations: Float[Array, "realization contributor"],
         limits: Float[Array, " realization"] | None = None,
-        *,
-        raised: kernel.Raised | None = None,
     ) -> Float[Array, "realization point"]:
-        """Return gaps (realization, point) [mm]; infinite ones of leaves where all are above `limits` (realization,) [mm].
-
-        The heights of the points are `raised`, if they are known; otherwise they follow from the deviations.
-        """
+        """Return gaps (realization, point) [mm]; infinite ones of leaves where all are above `limits` (realization,) [mm]."""
         gaps = np.empty((len(relative), len(self.pair.P_m)))
         limits = np.full(len(relative), np.inf) if limits is None else limits
-        kernel.write_gaps(*self._inputs(relative, deviations, raised), limits, gaps)
+        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+        kernel.write_gaps(self.points, self.raised, poses, heights, limits, gaps)
         return gaps
 
     def survey(
@@ -139,28 +137,20 @@ class FixedScan(Scan):
         deviations: Float[Array, "realization contributor"],
         may_carry: Bool[Array, "realization point"] | None = None,
         limit: float = np.inf,
-        *,
-        raised: kernel.Raised | None = None,
     ) -> tuple[Int[Array, "realization cluster"], Float[Array, "realization cluster"]]:
         """Return index and gap [mm] of the deepest point of each cluster, if its gap is less than `limit` [mm].
 
-        Otherwise these are the first point of the cluster, and `limit`. `clusters` and `raised` are as above.
+        Otherwise these are the first point of the cluster, and `limit`. `clusters` are as those of the scan.
         """
         points = np.empty((len(relative), len(clusters) - 1), dtype=np.int64)
         gaps = np.empty(points.shape)
         mask = np.empty((len(relative), 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
-        kernel.deepest(*self._inputs(relative, deviations, raised), clusters, mask, limit, points, gaps)
+        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+        kernel.deepest(self.points, self.raised, poses, heights, clusters, mask, limit, points, gaps)
         return points, gaps
 
-    def _inputs(
-        self, relative: np.ndarray, deviations: np.ndarray, raised: kernel.Raised | None
-    ) -> tuple[kernel.Points, kernel.Raised, np.ndarray, np.ndarray]:
-        """Return the first arguments of compiled passes."""
-        points = self.points if raised is None else self._nominal_points
-        return points, raised or NOT_RAISED, np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-
     @cached_property
-    def _nominal_points(self) -> kernel.Points:
+    def nominal_points(self) -> kernel.Points:
         """The points without the heights that deviations add."""
         points, size = self.points, self.points.basis.shape[1]
         boxes = (np.ascontiguousarray(boxes[:, : size - 1]) for boxes in (points.leaf_boxes, points.branch_boxes))

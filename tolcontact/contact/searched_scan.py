@@ -5,7 +5,7 @@ the gaps of its nominal points and its largest height. Planes also touch at loca
 are searched from the deepest point of each leaf.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -130,12 +130,8 @@ class BoundedScan(Scan):
 
 
 @dataclass(frozen=True, eq=False)
-class RaisedScan(Scan):
-    """A scan of some of the realizations of a block.
-
-    nominal   the scan of the nominal faces
-    raised    the heights of the realizations of the block, and the indices of those of this scan
-    minima    of the gap between the points
+class RaisedScan(FixedScan):
+    """The points of some of the realizations of a block, with known heights, and `minima` of the gap between the points.
 
     The lowest points of clusters take the remaining slots, too: faces with form end up on a few points anywhere, and fewer QPs
     find these points if all sides of the faces have rows from the first QP on.
@@ -143,20 +139,15 @@ class RaisedScan(Scan):
 
     fills = True
 
-    nominal: FixedScan
-    raised: kernel.Raised
-    minima: SearchedPlaces
+    minima: SearchedPlaces = field(kw_only=True)
 
     def take(self, rows: np.ndarray) -> "RaisedScan":
         return replace(self, raised=self.raised._replace(rows=self.raised.rows[rows]), minima=self.minima.take(rows))
 
-    def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        return self.nominal.deepest_of(self.nominal.clusters[[0, -1]], relative, deviations, raised=self.raised)[1][:, 0]
-
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         is_point, realization = points < FIRST_PLACE, self.raised.rows[:, None]
         numbers = np.where(is_point, points, 0)
-        P_m, P_r, n_r = (x[numbers] for x in (self.nominal.pair.P_m, self.nominal.pair.P_r, self.nominal.pair.n_r))
+        P_m, P_r, n_r = (x[numbers] for x in (self.pair.P_m, self.pair.P_r, self.pair.n_r))
         P_r = P_r - self.raised.points[realization, numbers][..., None] * n_r
         if not is_point.all():
             both = zip((P_m, P_r, n_r), self.minima.rows(points), strict=True)
@@ -167,8 +158,7 @@ class RaisedScan(Scan):
         return self.minima.holds(points) | (points < FIRST_PLACE)
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
-        clusters = self.nominal.clusters
-        points, gaps = self.nominal.deepest_of(clusters, relative, deviations, may_carry, raised=self.raised)
+        points, gaps = self.deepest_of(self.clusters, relative, deviations, may_carry)
         if self.minima.labels.shape[1]:
             points = np.concatenate([points, np.maximum(self.minima.labels, 0)], axis=1)
             gaps = np.concatenate([gaps, self.minima.gaps(relative)], axis=1)
@@ -202,8 +192,7 @@ class RaisedScan(Scan):
                 values[rows] = of_clear
             return replace(self, minima=every)
         grown, limits = pair.heights(deviations), pair.minima.bulge(deviations)
-        gaps = self.nominal.gaps(relative, deviations, limits, raised=self.raised)
-        P_m = self.nominal.pair.P_m[None]
+        gaps, P_m = self.gaps(relative, deviations, limits), self.pair.P_m[None]
         labels = pair.minima.find(relative, deviations, grown, P_m, gaps, limits, depth, in_steps=in_steps)
         labels = with_former(labels, self.minima.labels)
         if not labels.shape[1]:
@@ -222,4 +211,4 @@ def raised_scan(scan: FixedScan, deviations: Float[Array, "realization contribut
     raised = kernel.Raised(points, leaves, branches, np.arange(count))
     slopes, heights = of.coordinates[of.basis.shape[1] :], np.ascontiguousarray(deviations)
     kernel.sum_heights(of.columns, slopes, of.leaves, of.branches, heights, raised)
-    return RaisedScan(scan, raised, SearchedPlaces.none(count))
+    return RaisedScan(scan.pair, scan.nominal_points, scan.clusters, (), raised, minima=SearchedPlaces.none(count))
