@@ -2,17 +2,15 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.bounded_search import FREE_SHARE, BoundedSearch
-from tolcontact.contact.fixed_search import MIN_BULGE, Carriers, FixedSearch, Search
-from tolcontact.contact.scan import Scan, min_gaps
+from tolcontact.contact.bounded_search import FREE_SHARE, BoundedSearch, Guard
+from tolcontact.contact.fixed_search import MIN_BULGE, Carriers, FixedSearch, Search, StandingSearch
+from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
-from tolcontact.contact.standing_search import StandingSearch
 from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task
 from tolcontact.geometry.kernel import TINY
@@ -23,23 +21,6 @@ ACTIVE_GAP = 1e-9  # mm: points below it are active; gaps of faces that touch no
 APART = 2.0  # times the error of planes beyond their edges: bodies under load are no further apart
 CEILING_SHARE = 1e-4  # of the size: gaps of bodies at rest above which places need not be known
 ONCE = Search()
-
-
-class RawSurvey(NamedTuple):
-    """Gaps and active points of realizations in their raw state.
-
-    scans       for each pair the points that may be active
-    min_gap     (realization, pair) [mm]: the smallest gaps
-    active      (realization, pair): number of active points
-    moments     (realization, side, moment) of the points that count in the objective
-    is_inside   (realization,): whether faces with form penetrate each other between the points
-    """
-
-    scans: list[Scan]
-    min_gap: Float[Array, "realization pair"]
-    is_inside: Bool[Array, " realization"]
-    active: Int[Array, "realization pair"]
-    moments: Float[Array, "realization side moment"]
 
 
 class Candidates:
@@ -70,11 +51,10 @@ class Candidates:
         self.free_depth = FREE_SHARE * smallest
         self._allowed_bulge = max(ALLOWED_SHARE * smallest, 2 * MIN_BULGE)
         self.ceiling = CEILING_SHARE * max((pair.meeting.size for pair in self.bounded.values()), default=0.0)
-        guards = {k: pair.guard for k, pair in self.bounded.items() if pair.guard is not None}
-        of_bodies = {id(guard.neighbours): k for k, guard in reversed(guards.items())}
-        self.guards = {k: guards[k] for k in sorted(of_bodies.values())}
-        for k in self.guards:
-            self.bounded[k].adds_guard = True
+        self.guards: dict[int, Guard] = {}
+        for k, pair in self.bounded.items():
+            if pair.guard is not None and all(pair.guard.neighbours is not guard.neighbours for guard in self.guards.values()):
+                self.guards[k], pair.adds_guard = pair.guard, True
 
     def scans(
         self,
@@ -155,19 +135,11 @@ class Candidates:
 
     def survey(
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
-    ) -> RawSurvey:
-        """Return the survey of raw states, for deviations (realization, contributor)."""
-        scans = self.scans(relative, deviations)
-        active, moments = zip(
-            *(pair.survey(relative[:, k], deviations, ACTIVE_GAP) for k, pair in enumerate(self.pairs)), strict=True
-        )
-        return RawSurvey(
-            scans=scans,
-            min_gap=min_gaps(scans, relative, deviations),
-            is_inside=np.stack([scan.depth_between(relative[:, k]) for k, scan in enumerate(scans)]).max(axis=0) > 0,
-            active=np.stack(active, axis=1),
-            moments=np.concatenate([self._counted(k, of_active) for k, of_active in enumerate(moments)], axis=1),
-        )
+    ) -> tuple[Int[Array, "realization pair"], Float[Array, "realization side moment"]]:
+        """Return the number of active points of raw states, and the moments of the points that count in the objective."""
+        surveys = [pair.survey(relative[:, k], deviations, ACTIVE_GAP) for k, pair in enumerate(self.pairs)]
+        moments = [self._counted(k, of_active) for k, (_, of_active) in enumerate(surveys)]
+        return np.stack([active for active, _ in surveys], axis=1), np.concatenate(moments, axis=1)
 
     def _counted(self, k: int, active: np.ndarray) -> np.ndarray:
         """Return moments (realization, side, moment) of points that count in the objective, given those that are `active`."""
@@ -185,10 +157,9 @@ class Candidates:
 
     def carriers(self, k: int, state: State) -> Carriers:
         """Return the points of pair k under load."""
-        loaded, standing = state.loaded[:, self._spans[k]], self._standing[k]
-        if isinstance(standing, int):
-            return self.pairs[k].carriers(loaded, slots=state.slots[self._varying.index(k)])
-        return self.pairs[k].carriers(loaded, standing)
+        standing = self._standing[k]
+        points = state.slots[self._varying.index(k)] if isinstance(standing, int) else standing
+        return self.pairs[k].carriers(state.loaded[:, self._spans[k]], points)
 
 
 def pair_search(program: Program, index: int, tables: Sequence[np.ndarray] = ()) -> FixedSearch:

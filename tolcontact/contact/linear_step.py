@@ -7,7 +7,6 @@ a strictly convex problem, so the rounds end with the solution of the QP that ha
 
 import copy
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,13 +19,6 @@ from tolcontact.mechanics import ENTRIES
 
 MAX_ROUNDS = 60
 MAX_RESIDUAL = 1e-3  # of the group's length: a larger KKT residual [mm] is no answer
-
-
-class Step(NamedTuple):
-    """How large a step was, (n,) [mm]: its largest increment, and the same in the norm of the objective."""
-
-    size: Float[Array, " n"]
-    scaled: Float[Array, " n"]
 
 
 class LinearStep:
@@ -71,8 +63,10 @@ class LinearStep:
         caution: Float[Array, " n"] | float = 0.0,
         firmness: float = 1.0,
         newton: bool = False,
-    ) -> Step:
+    ) -> Float[Array, "2 n"]:
         """Take one linear step, the solution of the QP with a row for every point; write it into `state`.
+
+        Returns how large it was (2, n) [mm]: its largest increment, and the same in the norm of the objective.
 
         stride     the largest rotation of a part [rad] in the step
         caution    (n,): makes steps smaller, but does not change where they end
@@ -102,14 +96,16 @@ class LinearStep:
                 rows, slots = rows[enters], [new.take(enters) for new in slots]
                 part = (task.take(rows), state.take(rows))
                 part_inputs = {name: values[rows] for name, values in inputs.items()}
-            if newton:
-                self._set_reactions(part_inputs, [old.take(rows) for old in start_slots], slots)
+            if newton:  # the points in the slots have the reactions from the start of the step
+                part_inputs["reactions"] = part_inputs["reactions"].copy()
+                for k, old, new in zip(self.varying, start_slots, slots, strict=True):
+                    part_inputs["reactions"][:, self.spans[k]] = old.take(rows).reactions_of(new.points)
             deepest, size[:, rows] = self._solve_round(*part, part_inputs, slots)
             slots = part[1].slots
             if part[1] is not state:
                 state.put(rows, part[1])
         state.iterations[:] += 1
-        return Step(*size)
+        return size
 
     def _inputs(self, task: Task, state: State, slots: Sequence[Slots], newton: bool) -> dict[str, np.ndarray]:
         """Return the inputs that the QPs of all rounds share: the poses and reactions before the step, and its slots."""
@@ -120,12 +116,6 @@ class LinearStep:
             inputs["reactions"] = _cleared(inputs["reactions"], self.spans)
             bends[1:] = [_bend(task.scans[k], old, task.deviations) for k, old in zip(self.varying, slots, strict=True)]
         return inputs | {"bend": np.concatenate(bends, axis=1)}
-
-    def _set_reactions(self, inputs: dict[str, np.ndarray], start_slots: Sequence[Slots], slots: Sequence[Slots]) -> None:
-        """Set the reactions of the points in the slots to those that they had at the start of the step."""
-        inputs["reactions"] = inputs["reactions"].copy()
-        for k, old, new in zip(self.varying, start_slots, slots, strict=True):
-            inputs["reactions"][:, self.spans[k]] = old.reactions_of(new.points)
 
     def _solve_round(
         self, task: Task, state: State, inputs: Mapping[str, np.ndarray], slots: Sequence[Slots]

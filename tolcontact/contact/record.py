@@ -49,12 +49,12 @@ NUMBERS: tuple[Field[Any], ...] = fields(Record)
 
 def initial_numbers(count: int) -> dict[str, np.ndarray]:
     """Return the numbers (count,) before the first step, by name."""
-    return {entry.name: np.full(count, entry.metadata["start"], _dtype(entry)) for entry in NUMBERS}
+    return {entry.name: np.full(count, entry.metadata["start"], entry.metadata["variable"].kind) for entry in NUMBERS}
 
 
 def untouched_numbers(count: int) -> dict[str, np.ndarray]:
     """Return the numbers (count,) of realizations that contact does not touch, by name: zeros."""
-    return {entry.name: np.zeros(count, _dtype(entry)) for entry in NUMBERS}
+    return {entry.name: np.zeros(count, entry.metadata["variable"].kind) for entry in NUMBERS}
 
 
 def join_groups(totals: Record, rows: np.ndarray, group: Record) -> None:
@@ -71,7 +71,3 @@ def accumulate_starts(totals: Record, rows: np.ndarray, attempt: Record) -> None
             values = getattr(totals, entry.name)
             values[rows] += getattr(attempt, entry.name)
             getattr(attempt, entry.name)[:] = values[rows]
-
-
-def _dtype(entry: Field[Any]) -> np.dtype:
-    return np.dtype(entry.metadata["variable"].kind)

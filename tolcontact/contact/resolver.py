@@ -1,7 +1,7 @@
 """Resolve contact: move a group of parts from raw poses to poses without penetration, and rate the certainty of the answer.
 
 The linearized resolution takes one linear step. The exact one repeats them (see repeated_steps), from some starts about
-contact points that are projected again (see iterated_search). Realizations that end in a conflict, without an answer, or
+contact points that are projected again. Realizations that end in a conflict, without an answer, or
 far from the raw pose are tried again from other starts (see starts).
 """
 
@@ -13,18 +13,16 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
-from tolcontact.contact.acceptance import MAX_TURN, AcceptanceLimits
+from tolcontact.contact.acceptance import ADRIFT_SIZES, MAX_TURN, AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.fixed_search import Search
 from tolcontact.contact.free_steps import FreeSteps
-from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, LinearStep
 from tolcontact.contact.record import accumulate_starts
-from tolcontact.contact.repeated_steps import repeat
+from tolcontact.contact.repeated_steps import repeat, repeat_projected
 from tolcontact.contact.scan import PENETRATION, min_gaps, undone
 from tolcontact.contact.starts import FIRST, RESCUES, Start
 from tolcontact.contact.state import Outcome, Resolved, State, Task
-from tolcontact.discretization import ContactPoints
 from tolcontact.interference import ordered
 
 SAME_CONFLICT = 1e-3  # conflicts whose penetration differs by less than this share count as the same
@@ -50,8 +48,7 @@ class ContactResolver:
         self._force = sum(float(np.linalg.norm(load.vector)) for load in group.group.loads) or 1.0
         self.contact_points = [program.nominal.pairs[index] for index in group.group.pairs]
         self._springy = [k for k, pair in enumerate(self.contact_points) if pair.is_springy]
-        size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
-        self._limits = AcceptanceLimits(program.nominal, group.group, self._method, size, max_turn)
+        self._limits = AcceptanceLimits(program, group.group, self._candidates, max_turn)
         self._free_steps = FreeSteps(group.group, self._candidates, self._limits, self._relate, self._energy_of)
 
     def twin(self) -> "ContactResolver":
@@ -85,8 +82,9 @@ class ContactResolver:
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
     ) -> tuple[Float[Array, "realization pair_of_group"], Int[Array, "realization pair_of_group"]]:
         """Return the smallest gap [mm] and the number of active points of each pair of the group at raw X_RM."""
-        survey = self._candidates.survey(relative[:, self.pairs], deviations)
-        return survey.min_gap, survey.active
+        relative = relative[:, self.pairs]
+        scans = self._candidates.scans(relative, deviations)
+        return min_gaps(scans, relative, deviations), self._candidates.survey(relative, deviations)[0]
 
     def resolve(
         self,
@@ -103,8 +101,11 @@ class ContactResolver:
         deviations   (realization, contributor)
         """
         relative = relative[:, self.pairs]
-        survey = self._candidates.survey(relative, deviations)
-        moves = np.any(survey.min_gap < -PENETRATION, axis=1) | survey.is_inside | self._method.minimizes.presses
+        scans = self._candidates.scans(relative, deviations)
+        active, moments = self._candidates.survey(relative, deviations)
+        raw_gap = min_gaps(scans, relative, deviations)
+        depth_between = np.stack([scan.depth_between(relative[:, k]) for k, scan in enumerate(scans)]).max(axis=0)
+        moves = np.any(raw_gap < -PENETRATION, axis=1) | (depth_between > 0) | self._method.minimizes.presses
         unseen = np.flatnonzero(~moves)
         moves[unseen] = self._candidates.interfere(relative[unseen])
         touched = np.flatnonzero(moves)
@@ -112,36 +113,35 @@ class ContactResolver:
             raw=poses[touched][:, self.parts],
             relative=relative[touched],
             deviations=deviations[touched],
-            moments=survey.moments[touched],
+            moments=moments[touched],
             may_carry=self._candidates.may_carry(relative[touched], deviations[touched]),
-            scans=[scan.take(touched) for scan in survey.scans],
+            scans=[scan.take(touched) for scan in scans],
         )
         state = self._step.start(task.raw, task.relative)
         self._attempt(task, state, FIRST)
         if self._method.is_exact:
-            self._rescue(task, state, survey.min_gap[touched])
-        gap_min = np.stack([survey.min_gap, survey.min_gap], axis=1)
+            self._rescue(task, state, raw_gap[touched])
+        gap_min = np.stack([raw_gap, raw_gap], axis=1)
         gap_min[touched, 1] = state.gap_min
-        stays = self._stays(task, state)
-        gap_min[touched[stays], 0] = state.gap_min[stays]
-        return Resolved(touched[~stays], state.take(np.flatnonzero(~stays)), gap_min, survey.active)
-
-    def _stays(self, task: Task, state: State) -> Bool[Array, " n"]:
-        """Return whether answers are the raw poses, without contact (n,)."""
         is_loaded = (state.multipliers > 0).any(axis=1) | self._method.minimizes.presses
-        return state.certified & ~is_loaded & (self._limits.displacement(task.raw, state.poses) <= UNMOVED)
+        # The raw poses are the answer, without contact.
+        stays = state.certified & ~is_loaded & (self._limits.displacement(task.raw, state.poses) <= UNMOVED)
+        gap_min[touched[stays], 0] = state.gap_min[stays]
+        return Resolved(touched[~stays], state.take(np.flatnonzero(~stays)), gap_min, active)
 
     def _attempt(self, task: Task, state: State, start: Start) -> None:
         """Take steps from the poses of `state` to an answer, and judge it."""
         if start.projected:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull parts far if nothing holds them
-            search(self._step, self._limits, self._candidates, self._energy_of, task, state, start, caution)
+            repeat_projected(self._step, self._limits, self._candidates, self._energy_of, task, state, start, caution)
         elif self._method.is_exact:
             repeat(self._step, self._limits, self._candidates, self._free_steps, task, state, start)
         else:
             self._step.take(task, state, stride=start.stride)
         state.searched[:] = start.projected
-        self._leave_adrift(task, state)
+        adrift = self._limits.have_drifted(task, state, ADRIFT_SIZES)  # nothing holds a part against its forces
+        state.kkt_residual[adrift], state.slack[adrift], state.multipliers[adrift] = np.inf, 0, 0
+        state.poses[adrift], state.relative[adrift] = task.raw[adrift], task.relative[adrift]
         at_rest = Search(start, ceilings=None if start.free else np.full(len(state), self._candidates.ceiling))
         scans = self._candidates.scans(state.relative, task.deviations, at_rest, slots=state.slots, earlier=task.scans)
         task = replace(task, scans=scans)
@@ -150,17 +150,22 @@ class ContactResolver:
             depth = undone(task.scans, state.gap_min, state.relative, task.deviations, task.may_carry, state.slack)
             self._check_springs(task, state, depth)
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
-        state.doubtful[:] = self._limits.is_doubtful(task, state, self._candidates)
+        state.doubtful[:] = self._limits.is_doubtful(task, state)
         certified = np.flatnonzero(state.certified)
         state.doubtful[certified] = self._candidates.interfere(state.relative[certified])
         state.doubtful[:] |= self._candidates.are_apart(state) & state.certified
         state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & state.certified
         state.doubtful[:] |= self._limits.lie_in_form(task, state)
         if not start.projected:
-            self._doubt_rolled(task, state)
+            state.doubtful[:] |= self._limits.have_rolled(task, state)
 
     def _check_springs(self, task: Task, state: State, depth: Float[Array, "n pair"]) -> None:
-        """Write into `depth` [mm] how far compliant pairs miss their law, and the gaps between bent parts into the state."""
+        """Write into `depth` [mm] how far compliant pairs miss their law, and the gaps between bent parts into the state.
+
+        Springs push with their stiffness times their compression, and do not pull; a rigid support among them may not be
+        inside. Between bent parts a two-sided locator has no gap. Other points are open without a reaction, or closed: they do
+        not penetrate, and the compression that their own reaction alone would cause is not negative.
+        """
         flexibility = self.flexibility
         openings = None if flexibility is None else flexibility.openings(state.multipliers)
         for k in self._springy:
@@ -168,29 +173,14 @@ class ContactResolver:
             gaps = self._candidates.pairs[k].gaps(state.relative[:, k], task.deviations)
             reactions = state.multipliers[:, span]
             if flexibility is None or openings is None:
-                misfit = spring_misfit(pair, gaps, reactions)
+                compression = reactions / pair.stiffness
+                misfits = np.minimum(gaps + compression, compression)
             else:
                 gaps += openings[:, span]
                 gaps = -np.abs(gaps) if pair.holds else gaps  # it has no gap, either way
                 state.gap_min[:, k] = gaps.min(axis=1)
-                misfit = elastic_misfit(pair, gaps, reactions * np.diag(flexibility.C)[span])
-            depth[:, k] = misfit - state.slack[:, k]
-
-    def _leave_adrift(self, task: Task, state: State) -> None:
-        """Reset realizations to their raw poses if nothing holds a part against its forces."""
-        adrift = self._limits.is_adrift(task, state)
-        state.kkt_residual[adrift], state.slack[adrift], state.multipliers[adrift] = np.inf, 0, 0
-        state.poses[adrift], state.relative[adrift] = task.raw[adrift], task.relative[adrift]
-
-    def _doubt_rolled(self, task: Task, state: State) -> None:
-        """Mark answers as doubtful if contact points slid along tangent planes into a curved face."""
-        for k in self._candidates.curved:
-            rolled = np.flatnonzero(self._limits.rolled(k, state))
-            if rolled.size:
-                relative = state.relative[rolled, k]
-                scan = self._candidates.pairs[k].projected(relative)
-                depth = -scan.min_gap(relative, task.deviations[rolled])
-                state.doubtful[rolled] |= depth > self._limits.allowed(k)
+                misfits = gaps if pair.holds else np.minimum(gaps, reactions * np.diag(flexibility.C)[span])
+            depth[:, k] = np.abs(misfits).max(axis=1) - state.slack[:, k]
 
     def _rescue(self, task: Task, state: State, raw_gap: Float[Array, "n pair"]) -> None:
         """Try realizations again from other starts (see RESCUES), and keep the better answers.
@@ -245,7 +235,10 @@ class ContactResolver:
         best = state.take(rows)
         better = is_better(attempt, self._energy_of(part, attempt), best, self._energy_of(part, best), start.gain)
         state.put(rows[better], attempt.take(better))
-        return rows[~state.certified[rows] & ~is_same_conflict(attempt, best)]
+        depth, best_depth = attempt.slack.max(axis=1), best.slack.max(axis=1)
+        is_same = np.abs(depth - best_depth) <= SAME_CONFLICT * np.maximum(depth, best_depth)
+        is_same &= (attempt.outcome == Outcome.IN_CONFLICT) & (best.outcome == Outcome.IN_CONFLICT)
+        return rows[~state.certified[rows] & ~is_same]
 
     def _energy_of(self, task: Task, state: State) -> Float[Array, " n"]:
         energy = self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
@@ -278,35 +271,6 @@ def is_better(
     is_shallower = (outcome == Outcome.IN_CONFLICT) & (depth < best_depth - MIN_GAIN)
     gains = np.where(outcome == Outcome.RESOLVED, is_lower, is_shallower)
     return (outcome < best_outcome) | ((outcome == best_outcome) & gains)
-
-
-def is_same_conflict(state: State, best: State) -> Bool[Array, " n"]:
-    """Return whether answers, and the best ones so far, are conflicts of equal depth (n,)."""
-    depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
-    goes_as_deep = np.abs(depth - best_depth) <= SAME_CONFLICT * np.maximum(depth, best_depth)
-    return (state.outcome == Outcome.IN_CONFLICT) & (best.outcome == Outcome.IN_CONFLICT) & goes_as_deep
-
-
-def spring_misfit(pair: ContactPoints, gaps: Float[Array, "n point"], reactions: Float[Array, "n point"]) -> Float[Array, " n"]:
-    """Return how far gaps [mm] and reactions [N] of a pair miss the law of its springs (n,) [mm].
-
-    A compliant contact pushes with its stiffness times its compression, and does not pull. A rigid support among them may not
-    be inside.
-    """
-    assert pair.stiffness is not None
-    compression = reactions / pair.stiffness
-    return np.asarray(np.abs(np.minimum(gaps + compression, compression)).max(axis=1))
-
-
-def elastic_misfit(
-    pair: ContactPoints, gaps: Float[Array, "n point"], compression: Float[Array, "n point"]
-) -> Float[Array, " n"]:
-    """Return how far gaps [mm] between bent parts miss the law of contact (n,) [mm].
-
-    A two-sided locator has no gap. Other points are open without a reaction, or closed: they do not penetrate, and the
-    `compression` [mm], which their own reaction alone would cause, is not negative.
-    """
-    return np.asarray(np.abs(gaps if pair.holds else np.minimum(gaps, compression)).max(axis=1))
 
 
 def checked_residual(state: State, depth: Float[Array, " n"]) -> Float[Array, " n"]:

@@ -12,6 +12,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.contact import kernel
 from tolcontact.discretization import ContactPoints
@@ -83,28 +84,26 @@ class FixedScan(Scan):
     points     as compiled passes take them
     clusters   (cluster + 1,): the first branch of each cluster, and the end
     tables     moment tables (moment, point) of the sides that enter the objective
+    raised     the heights of the points, if they are known; otherwise they follow from the deviations
     """
 
     pair: ContactPoints
     points: kernel.Points
     clusters: Int[Array, " _"]
     tables: tuple[Float[Array, "moment point"], ...]
+    raised: kernel.Raised = NOT_RAISED
 
     def gaps(
         self,
         relative: Float[Array, "realization 12"],
         deviations: Float[Array, "realization contributor"],
         limits: Float[Array, " realization"] | None = None,
-        *,
-        raised: kernel.Raised | None = None,
     ) -> Float[Array, "realization point"]:
-        """Return gaps (realization, point) [mm]; infinite ones of leaves where all are above `limits` (realization,) [mm].
-
-        raised   the heights of the points, if they are known; otherwise they follow from the deviations
-        """
+        """Return gaps (realization, point) [mm]; infinite ones of leaves where all are above `limits` (realization,) [mm]."""
         gaps = np.empty((len(relative), len(self.pair.P_m)))
         limits = np.full(len(relative), np.inf) if limits is None else limits
-        kernel.write_gaps(*self._inputs(relative, deviations, raised), limits, gaps)
+        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+        kernel.write_gaps(self.points, self.raised, poses, heights, limits, gaps)
         return gaps
 
     def survey(
@@ -138,38 +137,25 @@ class FixedScan(Scan):
         deviations: Float[Array, "realization contributor"],
         may_carry: Bool[Array, "realization point"] | None = None,
         limit: float = np.inf,
-        *,
-        raised: kernel.Raised | None = None,
     ) -> tuple[Int[Array, "realization cluster"], Float[Array, "realization cluster"]]:
         """Return index and gap [mm] of the deepest point of each cluster, if its gap is less than `limit` [mm].
 
-        Otherwise these are the first point of the cluster, and `limit`.
-
-        clusters   (cluster + 1,): the first branch of each cluster, and the end
-        raised     the heights of the points, if they are known; otherwise they follow from the deviations
+        Otherwise these are the first point of the cluster, and `limit`. `clusters` are as those of the scan.
         """
         points = np.empty((len(relative), len(clusters) - 1), dtype=np.int64)
         gaps = np.empty(points.shape)
         mask = np.empty((len(relative), 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
-        kernel.deepest(*self._inputs(relative, deviations, raised), clusters, mask, limit, points, gaps)
+        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+        kernel.deepest(self.points, self.raised, poses, heights, clusters, mask, limit, points, gaps)
         return points, gaps
 
-    def _inputs(
-        self, relative: np.ndarray, deviations: np.ndarray, raised: kernel.Raised | None
-    ) -> tuple[kernel.Points, kernel.Raised, np.ndarray, np.ndarray]:
-        """Return the first arguments of compiled passes."""
-        points = self.points if raised is None else self._nominal_points
-        return points, raised or NOT_RAISED, np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-
     @cached_property
-    def _nominal_points(self) -> kernel.Points:
+    def nominal_points(self) -> kernel.Points:
         """The points without the heights that deviations add."""
         points, size = self.points, self.points.basis.shape[1]
-        leaf_boxes, branch_boxes = (
-            np.ascontiguousarray(boxes[:, : size - 1]) for boxes in (points.leaf_boxes, points.branch_boxes)
-        )
-        return points._replace(
-            columns=points.columns[:0], coordinates=points.coordinates[:size], leaf_boxes=leaf_boxes, branch_boxes=branch_boxes
+        boxes = (np.ascontiguousarray(boxes[:, : size - 1]) for boxes in (points.leaf_boxes, points.branch_boxes))
+        return kernel.Points(
+            points.basis, points.columns[:0], points.coordinates[:size], points.leaves, points.branches, *boxes
         )
 
     @cached_property
@@ -184,14 +170,73 @@ class FixedScan(Scan):
         return of_leaves, np.add.reduceat(of_leaves, self.points.branches[:-1], axis=0)
 
 
+@dataclass(frozen=True, eq=False)
+class ProjectedScan(Scan):
+    """The points of a fixed scan, with separate projections for every realization.
+
+    feet, normals    (realization, point, 3): P^r and n^r, nominal
+    over             (realization, point): points that do not overhang the rim of the reference face; the others cannot touch
+    """
+
+    fixed: FixedScan
+    feet: Float[Array, "realization point 3"]
+    normals: Float[Array, "realization point 3"]
+    over: Bool[Array, "realization point"]
+
+    def take(self, rows: np.ndarray) -> "ProjectedScan":
+        return ProjectedScan(self.fixed, self.feet[rows], self.normals[rows], self.over[rows])
+
+    def gaps(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
+    ) -> Float[Array, "realization point"]:
+        """Return gaps (realization, point) [mm], infinite for points beyond the rim."""
+        fixed, n = self.fixed, self.normals
+        offset = pose.apply(relative, fixed.pair.P_m) - self.feet
+        gaps = n[..., 0] * offset[..., 0] + n[..., 1] * offset[..., 1] + n[..., 2] * offset[..., 2]
+        if fixed.points.columns.size:
+            gaps -= fixed.pair.offsets.heights(deviations, np.broadcast_to(np.arange(len(fixed.pair.P_m)), gaps.shape))
+        return np.where(self.over, gaps, np.inf)
+
+    def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        return self.gaps(relative, deviations).min(axis=1)
+
+    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
+        gaps = np.minimum(self.gaps(relative, deviations), 0)
+        if may_carry is not None:
+            gaps = np.where(may_carry, gaps, 0)
+        firsts = self.fixed.points.leaves[self.fixed.points.branches[self.fixed.clusters]]
+        points = np.stack([gaps[:, a:b].argmin(axis=1) + a for a, b in itertools.pairwise(firsts)], axis=1)
+        return Deepest(points, -np.take_along_axis(gaps, points, axis=1))
+
+    def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        feet, normals = (np.take_along_axis(values, points[..., None], axis=1) for values in (self.feet, self.normals))
+        if self.fixed.points.columns.size:
+            feet = feet + self.fixed.pair.offsets.heights(deviations, points)[..., None] * normals
+        return self.fixed.pair.P_m[points], feet, normals
+
+
+def project(scan: FixedScan, relative: Float[Array, "realization 12"], margin: float) -> Scan:
+    """Return the scan of a pair with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
+
+    Points that overhang the rim by up to `margin` [mm] still count, so that points at the rim do not appear and
+    vanish with every step.
+    """
+    surface = scan.pair.reference_face
+    if surface is None:
+        return scan
+    shape = (len(relative), len(scan.pair.P_m), 3)
+    feet, normals, over = surface.project(pose.apply(relative, scan.pair.P_m).reshape(-1, 3), margin=margin)
+    if scan.pair.coordinate_error:
+        feet = feet - scan.pair.coordinate_error * normals
+    return ProjectedScan(scan, feet.reshape(shape), normals.reshape(shape), over.reshape(shape[:2]))
+
+
 def pair_scan(
     pair: ContactPoints, gaps: GapMap, tables: Sequence[np.ndarray], clusters: int, points: np.ndarray | None = None
 ) -> FixedScan:
-    """Sort the points of a pair into at most `clusters` clusters of neighbours, and each cluster into branches and leaves.
+    """Sort some points (point,) of a pair, or all, into at most `clusters` clusters of neighbours, branches and leaves.
 
     Each support has its own cluster.
-
-    points   indices (point,) of the points of the scan; all if it is None
     """
     points = np.arange(len(pair.P_m)) if points is None else points
     label = cluster_labels(pair.P_m[points], len(points) if pair.is_supports else clusters)
@@ -257,8 +302,7 @@ def undone(
 ) -> Float[Array, "realization pair"]:
     """Return the penetration beyond the slack of points that may be active (realization, pair) [mm].
 
-    min_gap     (realization, pair) [mm]: the smallest gaps of all points
-    may_carry   for each pair (realization, point), or None if all points may
+    The smallest gaps `min_gap` are of all points; `may_carry` has for each pair (realization, point), or None if all may.
     """
     depths = [
         -min_gap[:, k] if may is None else scan.deepest(relative[:, k], deviations, may).depth.max(axis=1)

@@ -55,14 +55,9 @@ class Task:
 
     def take(self, rows: np.ndarray) -> "Task":
         """Return the task of some realizations."""
-        return Task(
-            self.raw[rows],
-            self.relative[rows],
-            self.deviations[rows],
-            self.moments[rows],
-            [None if mask is None else mask[rows] for mask in self.may_carry],
-            [scan.take(rows) for scan in self.scans],
-        )
+        arrays = {name: getattr(self, name)[rows] for name in ("raw", "relative", "deviations", "moments")}
+        may_carry = [None if mask is None else mask[rows] for mask in self.may_carry]
+        return Task(**arrays, may_carry=may_carry, scans=[scan.take(rows) for scan in self.scans])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -198,14 +193,11 @@ class Resolved:
 
     def reactions(self, spans: Sequence[slice], pairs: Sequence[ContactPoints]) -> Float[Array, "n pair"]:
         """Return the sum of the reactions of each pair, (n, pair), whose rows of the QP are `spans`; pulls are negative."""
-        multipliers = [self.state.multipliers[:, span] for span in spans]
-        return np.stack(
-            [
-                (of_pair if pair.pulls is None else np.where(pair.pulls, -of_pair, of_pair)).sum(axis=1)
-                for of_pair, pair in zip(multipliers, pairs, strict=True)
-            ],
-            axis=1,
-        )
+        sums = []
+        for span, pair in zip(spans, pairs, strict=True):
+            reactions = self.state.multipliers[:, span]
+            sums.append((reactions if pair.pulls is None else np.where(pair.pulls, -reactions, reactions)).sum(axis=1))
+        return np.stack(sums, axis=1)
 
     def carrying(self, spans: Sequence[slice]) -> Int[Array, "n pair"]:
         """Return the number of points under load of each pair, (n, pair)."""

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,22 +11,12 @@ import trimesh
 
 from tolcontact.declaration import Assembly, ContactPair, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
-from tolcontact.discretization.fixed_contact import ContactPoints
-from tolcontact.discretization.form_points import (
-    affordable_spacing,
-    check_facing,
-    check_resolved,
-    coaxial_points,
-    facing_triangles,
-    form_lengths,
-    form_spacing,
-    with_rims,
-)
-from tolcontact.discretization.locators import Locators, NominalPart
-from tolcontact.discretization.offsets import Offsets
-from tolcontact.discretization.retained_nodes import retained_nodes
+from tolcontact.discretization import form_points
+from tolcontact.discretization.fixed_contact import ContactPoints, Offsets
+from tolcontact.discretization.locators import NominalPart
 from tolcontact.discretization.round_contact import RoundContact
 from tolcontact.discretization.scenes import Scene
+from tolcontact.elasticity import MAX_OFFSET, node_table
 from tolcontact.errors import GeometryFault
 from tolcontact.features import Features
 from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, sampling_error
@@ -40,7 +31,6 @@ DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
 FORM_POINTS = 10_000  # with form, if that resolves it
 DEFAULT_SPRINGS = 40  # which may all be active at once, so that a QP has a row for each
-KINDS = (RoundContact,)  # of contact between faces, if the model leaves the choice open; other faces have fixed points
 
 
 def contact_points(
@@ -59,12 +49,12 @@ def contact_points(
         features.deviation(pair.moving, meshes, moving.placement),
         features.deviation(pair.reference, meshes, reference.placement),
     )
-    lengths = form_lengths(deviating)
+    lengths = form_points.form_lengths(deviating)
     if lengths:
-        triangles = facing_triangles(moving_face, reference_face, deviating[1])
+        triangles = form_points.facing_triangles(moving_face, reference_face, deviating[1])
         unplaced, moving_face = unplaced.part(triangles), moving_face.part(triangles)
-        reference_face = reference_face.part(facing_triangles(reference_face, moving_face, deviating[0]))
-        check_facing(moving_face, reference_face, deviating)
+        reference_face = reference_face.part(form_points.facing_triangles(reference_face, moving_face, deviating[0]))
+        form_points.check_facing(moving_face, reference_face, deviating)
     rounding = coordinate_error(moving.mesh) + coordinate_error(reference.mesh)
     common: dict[str, Any] = {
         "name": pair.name,
@@ -78,13 +68,13 @@ def contact_points(
         "elastic": _bends(pair),
     }
     points: ContactPoints | None = None
-    for kind in KINDS if _is_open(pair) and not lengths else ():
-        points = points or kind.between(moving_face, reference_face, reach, rounding, common)
+    if _is_open(pair) and not lengths:
+        points = RoundContact.between(moving_face, reference_face, reach, rounding, common)
     if points is None:
         undetected = None
-        candidates = coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
+        candidates = form_points.coaxial_points(moving_face, reference_face, deviating) if _is_open(pair) and lengths else None
         if candidates is None and _is_open(pair):
-            candidates = retained_nodes((moving, reference), moving_face)
+            candidates = _retained_nodes((moving, reference), moving_face)
         if candidates is None:
             faces = moving_face, reference_face
             candidates, undetected = _candidates(scene.assembly, pair, moving, unplaced.mesh, faces, reach, lengths)
@@ -111,6 +101,20 @@ def _is_open(pair: ContactPair) -> bool:
     return pair.points is None and pair.spacing is None
 
 
+def _retained_nodes(parts: Sequence[NominalPart], face: Surface) -> np.ndarray | None:
+    """Return the nodes (node, 3) of an imported stiffness matrix, where forces can act, on the `face` or projected onto it.
+
+    They belong to the first part that has a matrix; None if no part has one. Raises GeometryFault if they cannot be read.
+    """
+    for number, part in enumerate(parts):
+        elastic = part.part.elasticity
+        if elastic is not None and elastic.nodes is not None:
+            nodes = part.placed(node_table(Path(elastic.nodes)).positions)
+            on_face, _, is_over = face.project(nodes)
+            return on_face[is_over] if number else nodes[np.linalg.norm(nodes - on_face, axis=1) <= MAX_OFFSET]
+    return None
+
+
 def _candidates(
     assembly: Assembly,
     pair: ContactPair,
@@ -131,20 +135,20 @@ def _candidates(
         points = unique_points(np.asarray(mesh.vertices))
     else:
         is_fine = lengths and _is_open(pair)
-        spacing = affordable_spacing(lengths, float(mesh.area), FORM_POINTS) if is_fine else pair.spacing
+        spacing = form_points.affordable_spacing(lengths, float(mesh.area), FORM_POINTS) if is_fine else pair.spacing
         open_count = DEFAULT_POINTS if pair.stiffness is None and not _bends(pair) else DEFAULT_SPRINGS
         count = open_count if _is_open(pair) else pair.points
         if spacing is not None:
             _check_number(mesh.area / spacing**2, f"a spacing of {spacing:g} mm gives")
         points = spread(mesh, count if spacing is None else None, spacing)
     if lengths:
-        check_resolved(points, mesh, lengths)
+        form_points.check_resolved(points, mesh, lengths)
     P_m, finest = moving.placed(points), assembly.smallest_zone()
     if moving_face.is_flat and reference_face.is_flat:
         if _is_open(pair):
             P_m = np.concatenate([P_m, overlap_corners(moving_face, reference_face)])
             if lengths:
-                P_m = with_rims(P_m, moving_face, reference_face, form_spacing(lengths), reach)
+                P_m = form_points.with_rims(P_m, moving_face, reference_face, form_points.form_spacing(lengths), reach)
     elif math.isfinite(finest):
         P_m, undetected = _with_curvature(moving_face, reference_face, P_m, finest, reach, is_open=_is_open(pair))
     P_m = distinct(P_m, ROUNDING * moving.mesh.scale)
@@ -208,18 +212,25 @@ def support_pairs(parts: tuple[NominalPart, ...], scenes: Sequence[Scene]) -> It
     """
     start = 0
     for index, part in enumerate(parts):
-        locators, owners = part.locators, np.array(part.owners or (index,) * len(part.locators), dtype=int)
+        locators, first = part.locators, start
+        start += len(locators)
+        if not part.free:
+            continue
+        owners = np.array(part.owners or (index,) * len(locators), dtype=int)
         scene = next(scene for scene in scenes if scene.station == part.station)
-        for owner in np.unique(owners[locators.one_sided]) if part.free else ():
+        for owner in np.unique(owners[locators.one_sided]):
             supports = np.flatnonzero(locators.one_sided & (owners == owner))
             name, elastic = scene.supports_name(parts[owner].part), bool(locators.elastic.any())
-            yield _locator_pair(part, name, int(owner), start, supports, elastic=elastic)
-        for number in np.flatnonzero(locators.elastic & ~locators.one_sided) if part.free else ():
+            yield _locator_pair(part, name, int(owner), first, supports, elastic=elastic)
+        for number in np.flatnonzero(locators.elastic & ~locators.one_sided):
             label, owner, point = locators.labels[number], int(owners[number]), np.array([number])
-            yield _locator_pair(part, label, owner, start, point, holds=True, elastic=True)
-        for number in np.flatnonzero(locators.springy & ~locators.one_sided & ~locators.elastic) if part.free else ():
-            yield _spring_pair(_locator_pair(part, locators.labels[number], int(owners[number]), start, np.array([number])))
-        start += len(locators)
+            yield _locator_pair(part, label, owner, first, point, holds=True, elastic=True)
+        for number in np.flatnonzero(locators.springy & ~locators.one_sided & ~locators.elastic):
+            # A compliant two-sided locator is a spring that pushes and one that pulls, at the same point.
+            locator = _locator_pair(part, locators.labels[number], int(owners[number]), first, np.array([number]))
+            pair, signs = locator.take(np.array([0, 0])), np.array([1.0, -1.0])
+            offsets = Offsets(pair.offsets.columns, pair.offsets.matrix * signs)
+            yield replace(pair, n_r=signs[:, None] * pair.n_r, offsets=offsets, pulls=signs < 0)
 
 
 def _locator_pair(
@@ -227,30 +238,13 @@ def _locator_pair(
 ) -> ContactPoints:
     """Return some locators of a part, by their numbers, as a pair."""
     locators = part.locators
-    P, n, stiffness = (
-        values[numbers]
-        for values in (locators.points, locators.directions, np.where(locators.springy, locators.stiffness, np.inf))
-    )
-    offsets, of_all = _support_offsets(locators, start, numbers), start + numbers
-    return ContactPoints(
-        name, owner, part.parent, P, P, n, offsets, locators=of_all, stiffness=stiffness, holds=holds, elastic=elastic
-    )
-
-
-def _spring_pair(locator: ContactPoints) -> ContactPoints:
-    """Return a compliant two-sided locator as a pair: a spring that pushes and one that pulls, at the same point."""
-    both, signs = locator.take(np.array([0, 0])), np.array([1.0, -1.0])
-    offsets = Offsets(both.offsets.columns, both.offsets.matrix * signs)
-    return replace(both, n_r=signs[:, None] * both.n_r, offsets=offsets, pulls=signs < 0)
-
-
-def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Offsets:
-    """Return the heights of supports: their own deviations, columns `start` on, and deviations of the faces they touch."""
-    offsets = [Offsets(start + supports, np.eye(len(supports)))]
-    for place, number in enumerate(supports):
+    P, n, stiffness = locators.points[numbers], locators.directions[numbers], locators.stiffness[numbers]
+    terms = [Offsets(start + numbers, np.eye(len(numbers)))]  # their own deviations, and deviations of the faces they touch
+    for place, number in enumerate(numbers):
         columns, factors = locators.pushes(number)
         if columns.size:
-            matrix = np.zeros((len(columns), len(supports)))
-            matrix[:, place] = factors
-            offsets.append(Offsets(columns, matrix))
-    return Offsets.joined(offsets, len(supports))
+            terms.append(Offsets(columns, np.outer(factors, np.arange(len(numbers)) == place)))
+    return ContactPoints(
+        name, owner, part.parent, P, P, n, Offsets.joined(terms, len(numbers)), locators=start + numbers,
+        stiffness=np.where(locators.springy[numbers], stiffness, np.inf), holds=holds, elastic=elastic,
+    )  # fmt: skip

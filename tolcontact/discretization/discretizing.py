@@ -4,7 +4,6 @@ import difflib
 import logging
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
-from itertools import starmap
 
 import numpy as np
 
@@ -140,7 +139,9 @@ def _on_features(
 ) -> NominalPart:
     """Return the part with the faces of features that its locators touch, and the feature of another part that they are on."""
     scheme, locators = part.scheme, part.locators
-    sides: Sequence[Face | Locator] = scheme.faces if isinstance(scheme, ThreeTwoOne) else scheme or ()
+    sides: Sequence[Face | Locator] = scheme if isinstance(scheme, tuple) else ()
+    if isinstance(scheme, ThreeTwoOne):
+        sides = [scheme.faces[k] for k in FACES_OF_SCHEME]
     if any((side.part or part.part).features for side in sides):
         if isinstance(scheme, ThreeTwoOne):
             place = designation("part", part.part)
@@ -159,17 +160,14 @@ def _on_features(
         locators = replace(locators, grounds=grounds)
     if features.causes:
         owners = [side.part or part.part for side in sides]
-        if isinstance(scheme, ThreeTwoOne):
-            owners = [owners[k] for k in FACES_OF_SCHEME]
-        locators = replace(
-            locators,
-            faces=tuple(map(features.at_point, locators.faces, owners, locators.points, map(placement_of, owners))),
-        )
+        at_points = map(features.at_point, locators.faces, owners, locators.points, map(placement_of, owners))
+        locators = replace(locators, faces=tuple(at_points))
         if location is not None and (ground := location.parent) is not None:
-            at_ground = (
-                (face, ground, point, placements[ground]) for face, point in zip(locators.grounds, locators.points, strict=True)
+            grounds = tuple(
+                features.at_point(face, ground, point, placements[ground])
+                for face, point in zip(locators.grounds, locators.points, strict=True)
             )
-            locators = replace(locators, grounds=tuple(starmap(features.at_point, at_ground)))
+            locators = replace(locators, grounds=grounds)
     return replace(part, locators=locators)
 
 
@@ -218,10 +216,9 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[s
 
 
 def _reserved_names(scene: Scene) -> Iterator[str]:
-    assembly = scene.assembly
     rigid = replace(scene, presses=False)
-    reserved = {scene.supports_name(part) for part in assembly.parts if rigid.has_supports(part)}
-    for pair in assembly.pairs:
+    reserved = {scene.supports_name(part) for part in scene.assembly.parts if rigid.has_supports(part)}
+    for pair in scene.assembly.pairs:
         if pair.name in reserved:
             place = designation("contact pair", pair)
             yield f"{place}: its name is reserved for the one-sided locators of a part; rename it"

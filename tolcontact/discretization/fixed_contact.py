@@ -1,9 +1,9 @@
-"""Contact points of a pair that are fixed for all realizations: samples of two faces, or locators.
+"""Contact points of a pair that are fixed for all realizations: samples of two faces, or locators; and heights of its faces.
 
-Other kinds of contact derive from FollowingContact (see following_contact).
+Another kind of contact derives from it, in a file of its own (see round_contact). Its equations derive from FixedGaps.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Self
@@ -13,8 +13,7 @@ from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.discretization.form_points import COVER_SHARE, form_lengths, form_spacing
-from tolcontact.discretization.offsets import Offsets, PairForm
+from tolcontact.discretization.form_points import COVER_SHARE, PairForm, form_lengths, form_spacing
 from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import CountedRegion, counted_regions, point_weights
 from tolcontact.errors import GeometryFault
@@ -30,15 +29,46 @@ MIN_SHARE = 1e-3  # of the mean share of a point in the stiffness of a pair
 
 
 @dataclass(frozen=True, eq=False)
+class Offsets:
+    """Heights of the contact points of a pair along n^r, linear in the deviations. Gaps are smaller by these heights.
+
+    columns   (contributor,): columns of the deviations
+    matrix    (contributor, point): height of each point per unit deviation
+    """
+
+    columns: np.ndarray
+    matrix: np.ndarray
+
+    @classmethod
+    def joined(cls, terms: "Sequence[Offsets]", points: int) -> "Offsets":
+        """Return the sum of offsets of the same points; without terms, heights do not vary."""
+        columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(term.columns for term in terms)]))
+        matrix = np.zeros((len(columns), points))
+        for term in terms:
+            matrix[np.searchsorted(columns, term.columns)] += term.matrix
+        return cls(columns, matrix)
+
+    def take(self, points: np.ndarray) -> "Offsets":
+        """Return the offsets of some points."""
+        return Offsets(self.columns, self.matrix[:, points])
+
+    def heights(self, deviations: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return heights (row, slot) [mm] of `points` (row, slot) for deviations (row, column), summed in a fixed order."""
+        heights = np.zeros(points.shape)
+        for column, row in zip(self.columns, self.matrix, strict=True):
+            heights += deviations[:, column, None] * row[points]
+        return heights
+
+
+@dataclass(frozen=True, eq=False)
 class ContactPoints:
     """Contact points of one pair, fixed for all realizations: P^m, P^r, n^r of the paper, each (point, 3).
-
-    samples_faces   whether points are samples of faces, which are counted by their areas, with gaps that are affine in X_RM;
-                    otherwise points follow from every pose, and no triangle enters their gaps
 
     The one-sided locators of a part are also a pair of this kind, and so is each compliant two-sided locator. Their reference
     is the part that they are on, or None for the ground. They have no faces; their offsets are the deviations.
 
+    samples_faces   whether points are samples of faces, which are counted by their areas, with gaps that are affine in X_RM;
+                    otherwise points follow from every pose, and no triangle enters their gaps
     moving_face, reference_face   in their nominal poses
     within      [mm] how far from each other opposite faces count in an objective
     coordinate_error   [mm] of both bodies, as their files store them: P_r lie below the reference face by it
@@ -78,7 +108,7 @@ class ContactPoints:
     @cached_property
     def facing(self) -> np.ndarray:
         """The decrease -n^m . n^r (point,) of gaps per unit height of the moving face."""
-        if self.moving_face is None:
+        if self.moving_face is None or not self.samples_faces:
             return np.ones(len(self.P_m))
         triangle, nearest = self.moving_face.nearest(self.P_m)
         return -(self.moving_face.normals(triangle, nearest) * self.n_r).sum(axis=1)
@@ -112,8 +142,8 @@ class ContactPoints:
 
     def take(self, points: Int[Array, " point"]) -> Self:
         """Return the pair with some of its points, in this order."""
-        arrays = {name: getattr(self, name) for name in ("P_m", "P_r", "n_r", "locators", "stiffness", "pulls")}
-        arrays = {name: values[points] for name, values in arrays.items() if values is not None}
+        names = "P_m", "P_r", "n_r", "locators", "stiffness", "pulls"
+        arrays = {name: getattr(self, name)[points] for name in names if getattr(self, name) is not None}
         return replace(self, **arrays, offsets=self.offsets.take(points))
 
     def without(self, held: Float[Array, "place 3"], distance: float) -> Self:
@@ -121,7 +151,7 @@ class ContactPoints:
 
         Raises GeometryFault if no point is left.
         """
-        if self.is_supports:
+        if self.is_supports or not self.samples_faces:
             return self
         free = np.flatnonzero(KDTree(held).query(self.P_m)[0] > distance)
         if not free.size:
@@ -134,13 +164,11 @@ class ContactPoints:
         """Return the pair with offsets by sizes and forms; heights of the moving face count along the reference normal."""
         if not any(self.deviating):
             return self
-        offsets, facing = list[Offsets](), self.facing
-        for face, share, P in zip(self.deviating, (facing, np.ones_like(facing)), (self.P_m, self.P_r), strict=True):
+        offsets = [Offsets(*modes) for modes in self._modes]
+        for face, share in zip(self.deviating, (self.facing, np.ones(len(self.P_m))), strict=True):
             if face is not None and face.grows:
                 offsets.append(Offsets(face.columns[face.height != 0], np.outer(face.height[face.height != 0], share)))
-            if face is not None and face.form is not None:
-                offsets.append(Offsets(face.form_columns, face.form.heights(P).T * share))
-        return replace(self, offsets=Offsets.joined(offsets, len(facing)))
+        return replace(self, offsets=Offsets.joined(offsets, len(self.P_m)))
 
     def stiffness_shares(self) -> Float[Array, " point"]:
         """Return the share (point,) of each contact point in the stiffness of its pair.
@@ -153,10 +181,10 @@ class ContactPoints:
                 "it has a stiffness, which needs flat faces, or a ball or shaft against walls; leave stiffness out"
             )
         shares = self.weights / len(self.P_m)
-        if shares.min() >= MIN_SHARE / len(shares):
-            return shares
-        shares = np.maximum(shares, MIN_SHARE / len(shares))  # a corner may represent no area
-        return shares / shares.sum()
+        if shares.min() < MIN_SHARE / len(shares):  # a corner may represent no area
+            shares = np.maximum(shares, MIN_SHARE / len(shares))
+            shares /= shares.sum()
+        return shares
 
     @property
     def has_form(self) -> bool:
@@ -171,13 +199,14 @@ class ContactPoints:
     @cached_property
     def minima(self) -> PlaneMinima | None:
         """The gap between contact points of two rigid planes with form; None for other pairs."""
-        if not self.has_form or self.moving_face is None or self.reference_face is None or self.is_springy:
+        moving, reference = self.moving_face, self.reference_face
+        if moving is None or reference is None or not self.has_form or self.is_springy:
             return None
-        if not (self.moving_face.is_flat and self.reference_face.is_flat):
+        if not (moving.is_flat and reference.is_flat):
             return None
         distance = np.quantile(KDTree(self.P_m).query(self.P_m, k=2)[0][:, 1], 0.9) if len(self.P_m) > 1 else 0.0
         reach = max(self.form_spacing / COVER_SHARE, float(distance))
-        return PlaneMinima.of((self.moving_face, self.reference_face), self.deviating, reach)
+        return PlaneMinima.of((moving, reference), self.deviating, reach)
 
     @cached_property
     def reference_rim(self) -> np.ndarray:
@@ -193,10 +222,8 @@ class ContactPoints:
 
     def highest(self, deviations: Float[Array, "row contributor"]) -> float:
         """Return a bound [mm] of the heights of both faces for some deviations."""
-        form = self.form(deviations)
-        return float(np.abs(self.heights(deviations)).max()) + (
-            0.0 if form is None else float(form.highest().sum(axis=0).max())
-        )
+        form, highest = self.form(deviations), float(np.abs(self.heights(deviations)).max())
+        return highest if form is None else highest + float(form.highest().sum(axis=0).max())
 
     def form_heights(self, deviations: np.ndarray, points: np.ndarray | slice = EVERY_POINT) -> np.ndarray:
         """Return the sums of both forms (row, point) [mm] at contact points, for deviations (row, contributor)."""
@@ -222,8 +249,7 @@ class ContactPoints:
     def least_gap(self, X_RM: np.ndarray, deviations: np.ndarray | None = None) -> np.ndarray:
         """Return the least gap (row,) [mm] of the points at X_RM (row, 12) for deviations (row, contributor) of the faces."""
         gaps, together = np.empty(len(X_RM)), max(1, GAPS_TOGETHER // max(len(self.P_m), 1))
-        for k in range(0, len(X_RM), together):
-            rows = slice(k, k + together)
+        for rows in (slice(k, k + together) for k in range(0, len(X_RM), together)):
             of_points = self.nominal_gaps(X_RM[rows])
             if deviations is not None and self.has_form:
                 of_points -= self.form_heights(deviations[rows])
@@ -231,8 +257,8 @@ class ContactPoints:
         return gaps if deviations is None else gaps - self.heights(deviations)
 
     def raw_depth(self, X_RM: Float[Array, "row 12"], deviations: Float[Array, "row contributor"]) -> float:
-        """Return the largest penetration [mm] of the points at raw poses X_RM, for deviations of the faces."""
-        return max(-float(self.least_gap(X_RM, deviations).min()), 0.0)
+        """Return the largest penetration [mm] of the points at raw poses X_RM, or a bound, for deviations of the faces."""
+        return max(-float(self.least_gap(X_RM, deviations).min()), 0.0) if self.samples_faces else self.travel(X_RM)
 
     def travel(self, X_RM: Float[Array, "row 12"]) -> float:
         """Return the travel [mm] of the moving face, or of points without one, from the nominal position."""
@@ -248,12 +274,14 @@ class ContactPoints:
     @property
     def curvature(self) -> float:
         """The largest curvature [1/mm] of a reference face that fixed planes represent; 0 if it is flat."""
-        return 0.0 if self.reference_face is None else self.reference_face.curvature
+        return self.reference_face.curvature if self.reference_face is not None and self.samples_faces else 0.0
 
     @property
     def may_miss_ends(self) -> bool:
         """Whether the points may miss contact where faces end, so that places of contact may be searched at every pose."""
-        if self.moving_face is None or self.reference_face is None or self.reference is None or self.is_springy:
+        if self.moving_face is None or self.reference_face is None or self.reference is None:
+            return False
+        if self.is_springy or not self.samples_faces:
             return False
         return not self.has_form or (self.moving_face.is_flat and self.reference_face.is_flat)
 
@@ -265,7 +293,7 @@ class ContactPoints:
     @cached_property
     def weights(self) -> Float[Array, " point"]:
         """The weights of the points (point,), by the areas that they represent; equal ones without sampled faces."""
-        if self.moving_face is None or self.reference_face is None:
+        if self.moving_face is None or self.reference_face is None or not self.samples_faces:
             return np.ones(len(self.P_m))
         return point_weights(self.P_m, self.P_r, self.moving_face, self.reference_face)
 

@@ -10,7 +10,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.discretization.fixed_contact import ContactPoints
-from tolcontact.discretization.offsets import PairForm
+from tolcontact.discretization.form_points import PairForm
 from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry import region_kernel
 from tolcontact.geometry.meeting import Meeting

@@ -1,11 +1,13 @@
-"""Contact points of faces with form: their spacing, and the faces that can have them."""
+"""Contact points of faces with form: their spacing, the faces that can have them, and the heights of form at any point."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import trimesh
 from scipy.spatial import KDTree
 
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry.analytic_surfaces import Cylinder
@@ -25,7 +27,40 @@ WIDE_SPACING_SHARE = 2 / 5  # the usual spacing of many points: a spread leaves 
 COVER_SHARE = 0.71  # of the spacing of a square grid: the distance from the centre of a square to the nearest point
 SQUARE_SHARE = 1.25  # of the area of a grid square: the least area that a point of a spread covers
 MIN_DISTANCE_SHARE = 1 / 4  # of the spacing: points of a rim that are nearer to others are left out
+MARGIN_SHARE = 0.05  # of the range of heights at many points: how much higher others may be
 EDGES = 8  # of the triangles whose corners are compared with contact points, in a correlation length
+
+
+@dataclass(frozen=True, eq=False)
+class PairForm:
+    """Heights of the forms of a moving and a reference plane that face each other, for deviations (row, contributor)."""
+
+    deviating: Sequence[FaceDeviation | None]
+    deviations: Float[Array, "row contributor"]
+
+    def take(self, rows: slice | np.ndarray) -> "PairForm":
+        """Return the forms of some rows."""
+        return PairForm(self.deviating, self.deviations[rows])
+
+    def at(self, row: Int[Array, " k"], P_m: Float[Array, "k 3"], P_r: Float[Array, "k 3"]) -> Float[Array, " k"]:
+        """Return the sum of both heights (k,) [mm] at points P_m, P_r (k, 3) of the nominal faces, each of its own row (k,)."""
+        return np.add(*(self.at_face(k, row, places) for k, places in enumerate((P_m, P_r))))
+
+    def at_face(self, k: int, row: Int[Array, " k"], places: Float[Array, "k 3"]) -> Float[Array, " k"]:
+        """Return the heights (k,) [mm] of one face at points `places` (k, 3), each of its own row; face 0 is the moving one."""
+        face = self.deviating[k]
+        if face is None or face.form is None:
+            return np.zeros(len(row))
+        return face.form.sums(places, row, self.deviations[:, face.form_columns])
+
+    def highest(self) -> Float[Array, "face row"]:
+        """Return bounds [mm] of the heights of the moving and the reference face, from the heights at many points of each."""
+        bounds = np.zeros((2, len(self.deviations)))
+        for k, face in enumerate(self.deviating):
+            if face is not None and face.form is not None:
+                heights = self.deviations[:, face.form_columns] @ face.form.place_heights
+                bounds[k] = heights.max(axis=1) + MARGIN_SHARE * np.ptp(heights, axis=1)
+        return bounds
 
 
 def form_lengths(deviating: Sequence[FaceDeviation | None]) -> list[float]:

@@ -1,6 +1,5 @@
 """The faces of a 3-2-1 scheme, and points on their material for its locators."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,16 +35,15 @@ class LocatingFace:
     outward: np.ndarray
 
     @classmethod
-    def of(cls, face: Face, meshes: Meshes) -> "LocatingFace":
-        """Return a face in its part's own frame."""
+    def of(cls, face: Face, meshes: Meshes, placement: Placement | None = None) -> "LocatingFace":
+        """Return a face in its part's own frame, or with a placement of the part."""
         mesh = patch(face, meshes).mesh
-        normal = mesh.area_faces @ mesh.face_normals
-        return cls(str(face), np.asarray(mesh.vertices), np.asarray(mesh.faces), normal / np.linalg.norm(normal))
-
-    def moved(self, placement: Placement) -> "LocatingFace":
-        """Return the face after a motion."""
-        R, t = placement
-        return LocatingFace(self.name, self.vertices @ R.T + t, self.faces, R @ self.outward)
+        vertices, normal = np.asarray(mesh.vertices), mesh.area_faces @ mesh.face_normals
+        outward = normal / np.linalg.norm(normal)
+        if placement is not None:
+            R, t = placement
+            vertices, outward = vertices @ R.T + t, R @ outward
+        return cls(str(face), vertices, np.asarray(mesh.faces), outward)
 
     @property
     def axes(self) -> np.ndarray:
@@ -67,7 +65,7 @@ class LocatingFace:
         """
         heights = self._heights(points @ self.axes.T, CLOSE * self.size)
         outside = np.flatnonzero(np.isnan(heights))
-        places = points.copy()
+        places = points
         if len(outside):
             candidates = self._candidates(inset)
             if not len(candidates):
@@ -75,11 +73,26 @@ class LocatingFace:
                     f"{len(outside)} of {len(points)} points of its 3-2-1 scheme lie beside the material of face {self.name}, "
                     f"and no place on the face is {inset:g} mm from its edges; make the inset smaller, or state the locators"
                 )
-            places = _spread(places, outside, candidates, lambda support: self._width(support, along))
+            places = self._spread(points, outside, candidates, along)
             heights[outside] = self._heights(places[outside] @ self.axes.T, CLOSE * self.size)
         lifts = heights - places @ self.outward
         lifts[np.abs(lifts) <= CLOSE * self.size] = 0.0
         return np.asarray(places + lifts[:, None] * self.outward)
+
+    def _spread(self, points: np.ndarray, outside: np.ndarray, candidates: np.ndarray, along: np.ndarray | None) -> np.ndarray:
+        """Return points (k, 3); those outside the material move to candidates (n, 3) of the widest support, one at a time."""
+        places = points.copy()
+        for _ in range(ROUNDS):
+            before = places.copy()
+            for number in outside:
+                supports = np.repeat(places[None], len(candidates), axis=0)
+                supports[:, number] = candidates
+                widths = self._width(supports, along)
+                widest = candidates[widths >= (1 - TIE) * widths.max()]
+                places[number] = widest[np.linalg.norm(widest - points[number], axis=1).argmin()]
+            if np.array_equal(places, before):
+                break
+        return places
 
     def _width(self, support: np.ndarray, along: np.ndarray | None) -> np.ndarray:
         """Return the widths (n,) of supports (n, k, 3): twice the area of a triangle, a length, or 0 for one point."""
@@ -131,21 +144,3 @@ class LocatingFace:
             share = np.clip((places - start) @ side / max(float(side @ side), 1e-300), 0, 1)
             distances = np.minimum(distances, np.linalg.norm(places - start - share[:, None] * side, axis=1))
         return distances
-
-
-def _spread(
-    points: np.ndarray, outside: np.ndarray, candidates: np.ndarray, width: Callable[[np.ndarray], np.ndarray]
-) -> np.ndarray:
-    """Return points (k, 3); those outside the material move to the candidates (n, 3) of the widest support, one at a time."""
-    places = points.copy()
-    for _ in range(ROUNDS):
-        before = places.copy()
-        for number in outside:
-            supports = np.repeat(places[None], len(candidates), axis=0)
-            supports[:, number] = candidates
-            widths = width(supports)
-            widest = candidates[widths >= (1 - TIE) * widths.max()]
-            places[number] = widest[np.linalg.norm(widest - points[number], axis=1).argmin()]
-        if np.array_equal(places, before):
-            break
-    return places

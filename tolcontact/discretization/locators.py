@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -58,19 +59,14 @@ class Locators:
     @classmethod
     def joined(cls, parts: Iterable["Locators"]) -> "Locators":
         """Return the locators of several parts, one part after the other."""
-        parts = tuple(parts)
-        return cls(
-            labels=tuple(label for part in parts for label in part.labels),
-            points=np.vstack([np.zeros((0, 3)), *(part.points for part in parts)]),
-            directions=np.vstack([np.zeros((0, 3)), *(part.directions for part in parts)]),
-            tolerances=tuple(tolerance for part in parts for tolerance in part.tolerances),
-            stiffness=np.array([value for part in parts for value in part.stiffness], dtype=float),
-            one_sided=np.array([value for part in parts for value in part.one_sided], dtype=bool),
-            springy=np.array([value for part in parts for value in part.springy], dtype=bool),
-            elastic=np.array([value for part in parts for value in part.elastic], dtype=bool),
-            faces=tuple(face for part in parts for face in part.faces),
-            grounds=tuple(ground for part in parts for ground in part.grounds),
-        )
+        parts, values = tuple(parts), dict[str, Any]()
+        for name in ("labels", "tolerances", "faces", "grounds"):
+            values[name] = tuple(entry for part in parts for entry in getattr(part, name))
+        for name in ("points", "directions"):
+            values[name] = np.vstack([np.zeros((0, 3)), *(getattr(part, name) for part in parts)])
+        for name, dtype in (("stiffness", float), ("one_sided", bool), ("springy", bool), ("elastic", bool)):
+            values[name] = np.array([value for part in parts for value in getattr(part, name)], dtype)
+        return cls(**values)
 
     @property
     def exact(self) -> np.ndarray:
@@ -173,9 +169,8 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     outside the material of the face moves to where the support is widest (see LocatingFace). Raises GeometryFault if the three
     faces are not independent, or the inset leaves no room.
     """
-    faces = [LocatingFace.of(face, meshes) for face in scheme.faces]
-    if placements:
-        faces = [face.moved(placement) for face, placement in zip(faces, placements, strict=True)]
+    of_faces: Sequence[Placement | None] = placements or [None] * 3
+    faces = [LocatingFace.of(face, meshes, placement) for face, placement in zip(scheme.faces, of_faces, strict=True)]
     outward = np.array([face.outward for face in faces])
     if abs(np.linalg.det(outward)) < MIN_DETERMINANT:
         raise GeometryFault(
@@ -192,14 +187,18 @@ def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes, placements: Sequence[Pl
     near_c, far_c = _support_coordinates(primary, c, inset, advice)
     near_b, far_b = _support_coordinates(primary, b, inset, advice)
     side_near, side_far = _support_coordinates(secondary, c, inset, advice)
-    rectangular = [
-        _place(edges, outward, primary, 0, {1: near_b, 2: near_c}),
-        _place(edges, outward, primary, 0, {1: near_b, 2: far_c}),
-        _place(edges, outward, primary, 0, {1: far_b, 2: (near_c + far_c) / 2}),
-        _place(edges, outward, secondary, 1, {0: _midpoint(secondary, a), 2: side_near}),
-        _place(edges, outward, secondary, 1, {0: _midpoint(secondary, a), 2: side_far}),
-        _place(edges, outward, tertiary, 2, {0: _midpoint(tertiary, a), 1: _midpoint(tertiary, b)}),
-    ]
+    coordinates: tuple[tuple[int, dict[int, float]], ...] = (  # of points on faces, along the edges of the other two
+        (0, {1: near_b, 2: near_c}),
+        (0, {1: near_b, 2: far_c}),
+        (0, {1: far_b, 2: (near_c + far_c) / 2}),
+        (1, {0: _midpoint(secondary, a), 2: side_near}),
+        (1, {0: _midpoint(secondary, a), 2: side_far}),
+        (2, {0: _midpoint(tertiary, a), 1: _midpoint(tertiary, b)}),
+    )
+    rectangular = []
+    for k, along in coordinates:
+        rows, level = np.array([outward[k], *(edges[axis] for axis in along)]), float((faces[k].vertices @ outward[k]).max())
+        rectangular.append(np.linalg.solve(rows, np.array([level, *along.values()])))
     sides = ((0, slice(0, 3), None), (1, slice(3, 5), c), (2, slice(5, 6), None))  # face, its points, what spreads them
     points = np.vstack([faces[k].on_material(np.array(rectangular[rows]), scheme.inset, along) for k, rows, along in sides])
     directions = -outward[list(FACES_OF_SCHEME)]
@@ -224,12 +223,6 @@ def _support_coordinates(points: np.ndarray, along: np.ndarray, inset: float, ad
 def _midpoint(points: np.ndarray, along: np.ndarray) -> float:
     places = points @ along
     return float(places.min() + places.max()) / 2
-
-
-def _place(edges: np.ndarray, outward: np.ndarray, points: np.ndarray, face: int, coordinates: dict[int, float]) -> np.ndarray:
-    """Return the point on the plane of a face with these coordinates along edges, by the edges' numbers."""
-    rows = [outward[face], *(edges[axis] for axis in coordinates)]
-    return np.linalg.solve(np.array(rows), np.array([float((points @ outward[face]).max()), *coordinates.values()]))
 
 
 @dataclass(frozen=True, eq=False)

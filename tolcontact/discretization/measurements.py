@@ -8,38 +8,10 @@ import scipy
 import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
-from tolcontact.declaration import (
-    Angle,
-    AxisDistance,
-    Chain,
-    Clearance,
-    Combination,
-    Face,
-    Flush,
-    Gap,
-    LargestGap,
-    MeanGap,
-    Measurement,
-)
+from tolcontact import declaration as declared
+from tolcontact.discretization import measured_geometry as measured
 from tolcontact.discretization.form_points import affordable_spacing, form_lengths, with_rims
-from tolcontact.discretization.measured_geometry import (
-    Axis,
-    AxisPair,
-    Combined,
-    Crossing,
-    DirectionPair,
-    FaceGap,
-    Heights,
-    LinearForm,
-    MeasuredFace,
-    MeasuredPoint,
-    MeshClearance,
-    NominalMeasurement,
-    Outline,
-    PlaneClearance,
-    RoundClearance,
-    Wall,
-)
+from tolcontact.discretization.measured_geometry import MeasuredFace, MeasuredPoint, NominalMeasurement, Wall
 from tolcontact.discretization.nominal import Nominal
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_contact import round_points
@@ -60,7 +32,7 @@ MAX_EDGE_PAIRS = 2500  # of two rims, between which crossings are found at every
 NO_LINES = np.zeros((0, 2, 3))
 
 
-def face_gap(moving: MeasuredFace, reference: MeasuredFace, is_largest: bool) -> FaceGap:
+def face_gap(moving: MeasuredFace, reference: MeasuredFace, is_largest: bool) -> measured.FaceGap:
     """Return the largest or the mean gap between two faces.
 
     Raises GeometryFault if they lie nowhere over each other, do not face each other, or need too many places.
@@ -82,15 +54,14 @@ def face_gap(moving: MeasuredFace, reference: MeasuredFace, is_largest: bool) ->
         for place, direction in zip(places, outward, strict=True)
     ]
     shown = np.abs(places - weights @ places / weights.sum()).sum(axis=1).argmin()
-    return FaceGap(np.array([[places[shown], feet[shown]]]), points, weights / weights.sum(), is_largest)
+    return measured.FaceGap(np.array([[places[shown], feet[shown]]]), points, weights / weights.sum(), is_largest)
 
 
 def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
     """Return points (place, 3) of the moving face over the reference face, including the rim of the common region."""
     surface, lengths = moving.surface, form_lengths([moving.deviation, reference.deviation])
-    spacing = (
-        affordable_spacing(lengths, surface.mesh.area, FORM_PLACES) if lengths else (surface.mesh.area / DEFAULT_PLACES) ** 0.5
-    )
+    area = surface.mesh.area
+    spacing = affordable_spacing(lengths, area, FORM_PLACES) if lengths else (area / DEFAULT_PLACES) ** 0.5
     places = spread(surface.mesh, None, spacing)
     share = float(reference.surface.project(places)[2].mean())
     if not lengths and share < 1:
@@ -98,8 +69,7 @@ def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
         places = spread(surface.mesh, None, spacing)
     if surface.is_flat and reference.surface.is_flat:
         places = np.concatenate([places, overlap_corners(surface, reference.surface)])
-        reach = float(np.ptp(np.vstack([surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
-        places = with_rims(places, surface, reference.surface, spacing, reach)
+        places = with_rims(places, surface, reference.surface, spacing, _extent(moving, reference))
     places = places[reference.surface.project(places)[2]]
     if len(places) and surface.surfaces:
         places, _, _ = surface.project(places)  # from triangles onto the round face that they approximate
@@ -119,7 +89,7 @@ class MeasuredFaces:
         self.nominal = nominal
         self._faces: dict[tuple[Any, ...], MeasuredFace] = {}
 
-    def __getitem__(self, face: Face) -> MeasuredFace:
+    def __getitem__(self, face: declared.Face) -> MeasuredFace:
         """Return a declared face. Raises GeometryFault if it has no triangles, or belongs to a feature only in part."""
         key = (face.part, *face.selections)
         if key not in self._faces:
@@ -128,7 +98,7 @@ class MeasuredFaces:
             self._faces[key] = MeasuredFace(face, part, surface, self.nominal.deviation(face))
         return self._faces[key]
 
-    def pair(self, measurement: Measurement) -> tuple[MeasuredFace, MeasuredFace]:
+    def pair(self, measurement: declared.Measurement) -> tuple[MeasuredFace, MeasuredFace]:
         """Return the two faces of a measurement."""
         moving, reference = (self[face] for face in measurement.faces)
         _check_varies([face.part for face in measurement.faces], [moving.deviation, reference.deviation])
@@ -144,7 +114,7 @@ def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, .
     faces, faults = MeasuredFaces(nominal), Faults()
     for measure in nominal.measures:
         measurements[measure.name] = None
-        if isinstance(measure.of, Measurement):
+        if isinstance(measure.of, declared.Measurement):
             place = designation(measure.noun, measure)
             measurements[measure.name] = faults.attempt(place, _with_numbers, measure.of, faces, measurements)
     faults.refuse(nominal.assembly.name)
@@ -155,7 +125,7 @@ def _with_numbers(
     measurement: Any, faces: MeasuredFaces, earlier: Mapping[str, NominalMeasurement | None]
 ) -> NominalMeasurement:
     """Return a measurement; it may refer to the earlier measures by name."""
-    if not isinstance(measurement, Combination):
+    if not isinstance(measurement, declared.Combination):
         return BUILDERS[type(measurement)](measurement, faces)
     numbers = {name: number for number, name in enumerate(earlier)}
     operands = [
@@ -163,7 +133,7 @@ def _with_numbers(
         for operand in measurement.operands
     ]
     lines = [_lines(faces.nominal, operand, earlier) if isinstance(operand, int) else operand.lines for operand in operands]
-    return Combined(np.concatenate(lines), measurement.kind, operands)
+    return measured.Combined(np.concatenate(lines), measurement.kind, operands)
 
 
 def _lines(nominal: Nominal, number: int, measurements: Mapping[str, NominalMeasurement | None]) -> np.ndarray:
@@ -175,16 +145,16 @@ def _lines(nominal: Nominal, number: int, measurements: Mapping[str, NominalMeas
     return np.array([[ends[0], ends[-1]]]) if ends else NO_LINES
 
 
-def _gap(gap: Gap, faces: MeasuredFaces) -> Heights:
-    face, point, nominal = faces[gap.face], gap.station, faces.nominal
-    position, deviation = nominal.position(point), nominal.face_at(point)
-    measured_point = MeasuredPoint(nominal.part_index(point.part), position, deviation, nominal.outward(point))
-    _check_varies([gap.station.part, gap.face.part], [measured_point.deviation, face.deviation])
+def _gap(gap: declared.Gap, faces: MeasuredFaces) -> measured.Heights:
+    face, station, nominal = faces[gap.face], gap.station, faces.nominal
+    position, deviation = nominal.position(station), nominal.face_at(station)
+    _check_varies([station.part, gap.face.part], [deviation, face.deviation])
+    point = MeasuredPoint(nominal.part_index(station.part), position, deviation, nominal.outward(station))
     wall = face.wall(position)
-    return Heights(np.array([[position, wall.foot(position)]]), [(measured_point, wall)])
+    return measured.Heights(np.array([[position, wall.foot(position)]]), [(point, wall)])
 
 
-def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement:
+def _clearance(clearance: declared.Clearance, faces: MeasuredFaces) -> NominalMeasurement:
     moving, reference = faces.pair(clearance)
     for face in (moving, reference):
         if face.deviation is not None and face.deviation.form is not None:
@@ -194,26 +164,26 @@ def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement
             )
     if moving.surface.is_flat and reference.surface.is_flat:
         return _clearance_of_planes(moving, reference)
-    reach = float(np.ptp(np.vstack([moving.surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
-    if points := round_points(moving.surface, reference.surface, reach):
+    if points := round_points(moving.surface, reference.surface, _extent(moving, reference)):
         rows = [point.nominal() for point in points]
         P_m, P_r, _ = min(rows, key=lambda row: float((row[0] - row[1]) @ row[2]))
-        return RoundClearance(np.array([[P_m, P_r]]), moving, reference, RoundPoints.of(points))
-    if all(_is_outer_cylinder(face) for face in (moving, reference)):
+        return measured.RoundClearance(np.array([[P_m, P_r]]), moving, reference, RoundPoints.of(points))
+    pieces = [face.surface.only_piece for face in (moving, reference)]
+    if all(piece is not None and isinstance(piece.surface, Cylinder) and not piece.is_hollow for piece in pieces):
         axes = moving.axis, reference.axis
-        return AxisPair(_nearest_places(moving.axis.ends, reference.axis.ends)[None], *axes, is_between_surfaces=True)
+        return measured.AxisPair(_nearest_places(axes[0].ends, axes[1].ends)[None], *axes, is_between_surfaces=True)
     return _clearance_of_meshes(moving, reference)
 
 
-def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> MeshClearance:
+def _extent(moving: MeasuredFace, reference: MeasuredFace) -> float:
+    """Return a distance [mm] that is larger than any between two faces."""
+    return float(np.ptp(np.vstack([moving.surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
+
+
+def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> measured.MeshClearance:
     """Return the clearance between triangles. Raises GeometryFault if too many of them are near each other."""
-    distances = [
-        np.linalg.norm(target.surface.nearest(corners)[1] - corners, axis=1).min()
-        for target, corners in (
-            (reference, moving.surface.vertices),
-            (moving, reference.surface.vertices),
-        )
-    ]
+    sides = (reference, moving.surface.vertices), (moving, reference.surface.vertices)
+    distances = [np.linalg.norm(target.surface.nearest(corners)[1] - corners, axis=1).min() for target, corners in sides]
     try:
         elements = nearest_elements(moving.surface.mesh, reference.surface.mesh, float(min(distances)))
     except GeometryFault as fault:
@@ -221,10 +191,11 @@ def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> MeshC
         raise GeometryFault(
             f"the clearance of {kinds} cannot be measured: {fault}; or measure the gaps of points with tc.Gap"
         ) from fault
-    return MeshClearance(elements.line[None], moving, reference, elements, trimesh.bounds.corners(moving.surface.mesh.bounds))
+    corners = trimesh.bounds.corners(moving.surface.mesh.bounds)
+    return measured.MeshClearance(elements.line[None], moving, reference, elements, corners)
 
 
-def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heights | PlaneClearance:
+def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> measured.Heights | measured.PlaneClearance:
     """Return the clearance of planes that face each other, within the nominal overlap if their rims have too many edges."""
     if not moving.plane.axis @ reference.plane.axis < OPPOSING_COSINE:
         raise GeometryFault(
@@ -240,7 +211,7 @@ def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heigh
     crossings = []
     for edges in zip(*crossing_edges(moving.surface, reference.surface), strict=True):
         p, q = (end - start for start, end in edges)
-        crossings.append(Crossing(moving, reference, edges, float(np.sign(np.cross(p, q) @ reference.plane.axis))))
+        crossings.append(measured.Crossing(moving, reference, edges, float(np.sign(np.cross(p, q) @ reference.plane.axis))))
     lines = [[point.position, wall.foot(point.position)] for point, wall in points]
     lines += [list(_nearest_places(*crossing.edges)) for crossing in crossings]
     if not lines:
@@ -249,13 +220,11 @@ def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heigh
             "the gap of a point with tc.Gap"
         )
     shortest = min(lines, key=lambda line: float(np.linalg.norm(line[1] - line[0])))
-    heights, outlines = (
-        Heights(np.array([shortest]), points, crossings),
-        (Outline.of(moving.surface), Outline.of(reference.surface)),
-    )
+    heights = measured.Heights(np.array([shortest]), points, crossings)
+    outlines = measured.Outline.of(moving.surface), measured.Outline.of(reference.surface)
     if len(outlines[0].edges) * len(outlines[1].edges) > MAX_EDGE_PAIRS:
         return heights
-    return PlaneClearance(heights.lines, moving, reference, (moving.plane, reference.plane), outlines, heights)
+    return measured.PlaneClearance(heights.lines, moving, reference, (moving.plane, reference.plane), outlines, heights)
 
 
 def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
@@ -266,31 +235,26 @@ def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
         return points
 
 
-def _axis_distance(distance: AxisDistance, faces: MeasuredFaces) -> AxisPair:
+def _axis_distance(distance: declared.AxisDistance, faces: MeasuredFaces) -> measured.AxisPair:
     moving, reference = (face.axis for face in faces.pair(distance))
-    lines = np.array([moving.ends, reference.ends])
-    if distance.across is not None:
-        n = np.array(distance.across)
+    lines, across, along = [moving.ends, reference.ends], distance.across, distance.along
+    if across is not None:
+        n = np.array(across)
         for axis, face in zip((moving, reference), distance.faces, strict=True):
             if axis.direction.any() and abs(float(axis.direction @ n)) < PARALLEL:
                 raise GeometryFault(
                     f"the axis of {face} is parallel to the plane that is to cut it; choose another direction across"
                 )
-        foot = reference.midpoint + _slide(reference, n, moving.midpoint)
-        return AxisPair(np.concatenate([lines, [[moving.midpoint, foot]]]), moving, reference, across=n)
-    if distance.along is not None:
+        slide = reference.direction if reference.direction.any() else n  # along the axis; for a centre, along n
+        foot = reference.midpoint + slide * float((moving.midpoint - reference.midpoint) @ n) / float(slide @ n)
+        return measured.AxisPair(np.array([*lines, [moving.midpoint, foot]]), moving, reference, across=n)
+    if along is not None:
         foot = reference.midpoint + ((moving.midpoint - reference.midpoint) @ reference.direction) * reference.direction
-        return AxisPair(np.concatenate([lines, [[moving.midpoint, foot]]]), moving, reference, along=np.array(distance.along))
-    return AxisPair(np.concatenate([lines, [_nearest_places(moving.ends, reference.ends)]]), moving, reference)
+        return measured.AxisPair(np.array([*lines, [moving.midpoint, foot]]), moving, reference, along=np.array(along))
+    return measured.AxisPair(np.array([*lines, _nearest_places(*lines)]), moving, reference)
 
 
-def _slide(axis: Axis, n: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return the vector (3,) along an axis, or for a centre along n, to the plane across n through a point (3,)."""
-    direction = axis.direction if axis.direction.any() else n
-    return np.asarray(direction * float((place - axis.midpoint) @ n) / float(direction @ n))
-
-
-def _angle(angle: Angle, faces: MeasuredFaces) -> DirectionPair:
+def _angle(angle: declared.Angle, faces: MeasuredFaces) -> measured.DirectionPair:
     moving, reference = faces.pair(angle)
     u, v = moving.direction, reference.direction
     about = None if angle.about is None else np.array(angle.about)
@@ -303,7 +267,7 @@ def _angle(angle: Angle, faces: MeasuredFaces) -> DirectionPair:
     length = min(float(face.surface.mesh.scale) for face in (moving, reference)) / 2
     starts = [np.asarray(face.surface.mesh.bounds).mean(axis=0) for face in (moving, reference)]
     lines = np.array([[start, start + length * vector] for start, vector in zip(starts, (u, v), strict=True)])
-    return DirectionPair(lines, moving, reference, (u, v), about)
+    return measured.DirectionPair(lines, moving, reference, (u, v), about)
 
 
 def _check_varies(parts: Iterable[Any], deviations: Iterable[Any]) -> None:
@@ -313,11 +277,6 @@ def _check_varies(parts: Iterable[Any], deviations: Iterable[Any]) -> None:
             f'it is measured within part "{part.name}", whose faces there do not deviate, so it is constant; take faces of two '
             "parts, or features with tolerances"
         )
-
-
-def _is_outer_cylinder(face: MeasuredFace) -> bool:
-    piece = face.surface.only_piece
-    return piece is not None and isinstance(piece.surface, Cylinder) and not piece.is_hollow
 
 
 def _kind(face: MeasuredFace) -> str:
@@ -332,19 +291,20 @@ def _nearest_places(moving: np.ndarray, reference: np.ndarray) -> np.ndarray:
     return np.array([moving[0] + nearest.x[0] * p, reference[0] + nearest.x[1] * q])
 
 
-def _chain(chain: Chain, faces: MeasuredFaces) -> LinearForm:
+def _chain(chain: declared.Chain, faces: MeasuredFaces) -> measured.LinearForm:
     """Return a chain with numbers. Raises GeometryFault for a link that is no contributor."""
     labels, nominals = faces.nominal.contributors, {cause.name: cause.nominal for cause in faces.nominal.assembly.variables}
     if unknown := [label for label in chain.sensitivities if label not in labels]:
         raise GeometryFault(f'its link "{unknown[0]}" is no contributor{nearest_name(unknown[0], labels)}')
     constant = chain.nominal + sum(factor * (nominals.get(label) or 0.0) for label, factor in chain.sensitivities.items())
     columns = np.array([labels.index(label) for label in chain.sensitivities])
-    return LinearForm(NO_LINES, float(constant), columns, np.array(list(chain.sensitivities.values()), dtype=float))
+    return measured.LinearForm(NO_LINES, float(constant), columns, np.array(list(chain.sensitivities.values()), dtype=float))
 
 
 Builder = Callable[[Any, MeasuredFaces], NominalMeasurement]
-BUILDERS: Mapping[type[Measurement], Builder] = {
-    Gap: _gap, Flush: _gap, Clearance: _clearance, AxisDistance: _axis_distance, Angle: _angle, Chain: _chain,
-    LargestGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=True),
-    MeanGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=False),
+BUILDERS: Mapping[type[declared.Measurement], Builder] = {
+    declared.Gap: _gap, declared.Flush: _gap, declared.Clearance: _clearance, declared.AxisDistance: _axis_distance,
+    declared.Angle: _angle, declared.Chain: _chain,
+    declared.LargestGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=True),
+    declared.MeanGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=False),
 }  # fmt: skip

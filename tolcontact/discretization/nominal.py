@@ -5,21 +5,27 @@ from functools import cached_property
 
 import numpy as np
 
+from tolcontact.arrays import Array, Int
 from tolcontact.declaration import Assembly, Face, Measure, Part, Point
 from tolcontact.discretization.fixed_contact import ContactPoints
 from tolcontact.discretization.locators import Locators, NominalPart
 from tolcontact.discretization.measured_geometry import NominalMeasurement
-from tolcontact.discretization.weld import ElasticInputs, Weld
+from tolcontact.discretization.weld_pairs import Weld
 from tolcontact.features import Expansion, FaceDeviation, Features, Freedom, NominalFeature, NominalPattern
 from tolcontact.features.freedoms import LOCATOR, VARIABLE
 from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import Meshes, triangles
+from tolcontact.geometry.triangle_mesh import coordinate_error, coordinate_spacing
+from tolcontact.texts import shown
+from tolcontact.vocabulary import STATED_ERROR_SHARE
 
+NOTICED_SHARE = 0.01  # of the error of a pair: a smaller error of one of its parts is not stated
+MAX_NAMES = 6  # of parts; how many there are beyond is a number
 FITTED_ERRORS = 2.0  # coordinate errors: largest distance of triangles from the planes fitted to them, and from their inset
 
 
 @dataclass(frozen=True, eq=False)
-class Nominal(ElasticInputs):
+class Nominal:
     """An assembly with numbers.
 
     measurements   of each measure; None if it measures points or an expression
@@ -93,6 +99,17 @@ class Nominal(ElasticInputs):
         """The labels of the freedoms."""
         return tuple(freedom.label for freedom in self.freedoms)
 
+    @property
+    def input_count(self) -> int:
+        """The number of inputs of a realization: its deviations, and the gaps that welds keep."""
+        return len(self.contributors) + sum(len(weld.columns) for weld in self.welds)
+
+    @cached_property
+    def loads(self) -> Int[Array, "load 2"]:
+        """The pair and the point of each load: of the reactions at the contact points of pairs with an elastic part."""
+        points = [(k, point) for k, pair in enumerate(self.pairs) if pair.elastic for point in range(len(pair.P_m))]
+        return np.array(points, dtype=int).reshape(-1, 2)
+
     def columns(self, part: int) -> np.ndarray:
         """Return the columns of a part's locators."""
         start = sum(len(earlier.locators) for earlier in self.parts[:part])
@@ -164,3 +181,32 @@ class Nominal(ElasticInputs):
         surface = self._features.features[point.on].surfaces[0]  # features that grow in height have one face
         triangle, foot = surface.nearest(np.array([point.position]))
         return part.placement[0] @ surface.normals(triangle, foot)[0]
+
+
+def coordinates_in_words(nominal: Nominal) -> str:
+    """Return the coordinate spacing of parts in contact, and the allowance of contact for it; empty if it hardly matters."""
+    least = STATED_ERROR_SHARE * nominal.assembly.smallest_zone()
+    stated = [pair for pair in nominal.pairs if pair.coordinate_error > least]
+    if not stated:
+        return ""
+    names: dict[str, list[str]] = {}
+    for pair in stated:
+        for part in (nominal.parts[index] for index in (pair.moving, pair.reference) if index is not None):
+            if coordinate_error(part.mesh) > NOTICED_SHARE * pair.coordinate_error:
+                of_spacing = names.setdefault(f"{coordinate_spacing(part.mesh).max():.2g} mm", [])
+                if part.name not in of_spacing:
+                    of_spacing.append(part.name)
+    (spacing, first), *others = names.items()
+    stored = f"coordinates of {_listed(first)} are stored to {spacing}"
+    stored += "".join(f", of {_listed(others)} to {spacing}" for spacing, others in others)
+    errors = np.array([pair.coordinate_error for pair in stated])
+    most = "" if np.ptp(errors) < NOTICED_SHARE * errors.max() else "up to "
+    return f"{stored}; contact allows {most}{errors.max():.2g} mm"
+
+
+def _listed(names: list[str]) -> str:
+    """Return names of parts as a list in words."""
+    quoted = [f'"{shown(name)}"' for name in names[:MAX_NAMES]]
+    if len(names) > MAX_NAMES:
+        quoted.append(f"{len(names) - MAX_NAMES} other parts")
+    return " and ".join([", ".join(quoted[:-1]), quoted[-1]] if len(quoted) > 1 else quoted)

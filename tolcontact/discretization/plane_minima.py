@@ -60,8 +60,8 @@ class PlaneMinima:
         cls, faces: tuple[Surface, Surface], deviating: tuple[FaceDeviation | None, FaceDeviation | None], reach: float
     ) -> "PlaneMinima":
         """Return the gap between a moving and a reference plane, whose contact points are `reach` [mm] apart."""
-        planes = [_plane(face, deviation) for face, deviation in zip(faces, deviating, strict=True)]
-        return cls(deviating, planes[0], planes[1], reach, SAME_PLACE * max(float(face.mesh.scale) for face in faces))
+        moving, reference = map(_plane, faces, deviating)
+        return cls(deviating, moving, reference, reach, SAME_PLACE * max(float(face.mesh.scale) for face in faces))
 
     def heights(
         self,
@@ -88,13 +88,13 @@ class PlaneMinima:
 
     def projection_error(self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:
         """Return a bound [mm] of the error of heights at nominal projections: a slope times their displacement at X_RM."""
-        reference = self.deviating[1]
-        if reference is None or reference.form is None:
+        form = self._forms[1]
+        if form is None:
             return np.zeros(len(X_RM))
         moving = self.moving
         corners = moving.origin + np.array([(u, v) for u in moving.corners[:, 0] for v in moving.corners[:, 1]]) @ moving.axes
         travel = np.linalg.norm((pose.apply(X_RM, corners) - corners) @ self.reference.axes.T, axis=2).max(axis=1)
-        return EXTREME * self._root_sums(self._squares, deviations)[1] / min(reference.form.scales) * travel
+        return EXTREME * self._root_sums(self._squares, deviations)[1] / min(form.scales) * travel
 
     def _root_sums(self, mean_squares: Sequence[np.ndarray], deviations: np.ndarray) -> np.ndarray:
         """Return root mean squares (face, n) [mm] over both faces, from mean squares (mode,) of their modes."""
@@ -104,29 +104,31 @@ class PlaneMinima:
                 roots[k] = np.sqrt(deviations[:, face.form_columns] ** 2 @ squares)
         return roots
 
+    @property
+    def _forms(self) -> list[FormField | None]:
+        """The forms of the moving and the reference face."""
+        return [None if face is None else face.form for face in self.deviating]
+
     @cached_property
     def _is_smooth(self) -> bool:
-        fields = [face.form for face in self.deviating if face is not None and face.form is not None]
-        return all(field.form.covariance == SMOOTH and not field.scans for field in fields)
+        return all(form is None or (form.form.covariance == SMOOTH and not form.scans) for form in self._forms)
 
     @cached_property
     def _squares(self) -> list[np.ndarray]:
         """The mean squares (mode,) of the modes of both faces."""
-        fields = (None if face is None else face.form for face in self.deviating)
-        return [np.zeros(0) if field is None else (field.place_heights**2).mean(axis=1) for field in fields]
+        return [np.zeros(0) if form is None else (form.place_heights**2).mean(axis=1) for form in self._forms]
 
     @cached_property
     def _bends(self) -> list[np.ndarray]:
         """The mean squares (mode,) of second differences of the modes of both faces, over the reach."""
         bends = []
-        for face, plane in zip(self.deviating, (self.moving, self.reference), strict=True):
-            field = None if face is None else face.form
+        for form, plane in zip(self._forms, (self.moving, self.reference), strict=True):
             differences = [
-                field.heights(field.places + self.reach * axis)
-                + field.heights(field.places - self.reach * axis)
-                - 2 * field.place_heights.T
+                form.heights(form.places + self.reach * axis)
+                + form.heights(form.places - self.reach * axis)
+                - 2 * form.place_heights.T
                 for axis in plane.axes
-                if field is not None
+                if form is not None
             ]
             bends.append((np.concatenate(differences) ** 2).mean(axis=0) if differences else np.zeros(0))
         return bends
@@ -177,16 +179,11 @@ class PlaneMinima:
 
     def _inputs(self, X_RM: np.ndarray, deviations: np.ndarray) -> tuple[Plane, Plane, np.ndarray, HeightSums, HeightSums]:
         """Return the planes, the poses, and the factors of the modes of both, for compiled functions."""
-        factors = [
-            np.ascontiguousarray(deviations[:, face.form_columns])
-            if face is not None and face.form is not None
-            else np.zeros((len(X_RM), 0))
-            for face in self.deviating
-        ]
-        sums = [
-            HeightSums.of(plane.table, values) for plane, values in zip((self.moving, self.reference), factors, strict=True)
-        ]
-        return self.moving, self.reference, np.ascontiguousarray(X_RM), sums[0], sums[1]
+        planes, sums = (self.moving, self.reference), []
+        for face, plane in zip(self.deviating, planes, strict=True):
+            columns = np.zeros(0, dtype=int) if face is None or face.form is None else face.form_columns
+            sums.append(HeightSums.of(plane.table, np.ascontiguousarray(deviations[:, columns])))
+        return *planes, np.ascontiguousarray(X_RM), sums[0], sums[1]
 
 
 def with_former(labels: Int[Array, "n a"], former: Int[Array, "n b"]) -> Int[Array, "n c"]:

@@ -41,17 +41,16 @@ class CountedRegion(NamedTuple):
 def counted_regions(
     moving: Surface | None, reference: Surface | None, within: float
 ) -> tuple[CountedRegion | None, CountedRegion | None]:
-    """Return the parts of both faces of a pair that an objective counts; None without faces, or if there is no such part."""
+    """Return the parts of both faces of a pair that an objective counts; None without faces, or if there is no such part.
+
+    A face counts where it is over the other one, along the normals of the other one, and faces it `within` a distance [mm].
+    """
     if moving is None or reference is None:
         return None, None
-    return counted_region(moving, reference, within), counted_region(reference, moving, within)
+    return _counted_region(moving, reference, within), _counted_region(reference, moving, within)
 
 
-def counted_region(face: Surface, target: Surface, within: float) -> CountedRegion | None:
-    """Return the part of a face that an objective counts; None if no part of it is opposite to the target.
-
-    It is the part over the target, along the normals of the target, that faces it `within` a distance [mm].
-    """
+def _counted_region(face: Surface, target: Surface, within: float) -> CountedRegion | None:
     elements = _exact_elements(face, target, within) or _elements(MOST_POINTS, within, face, target, by_cosines=True)
     return None if elements is None else _region(elements, face)
 

@@ -7,16 +7,16 @@ needs no contact point: rows of the same nodes would contradict each other by th
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import trimesh
 
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.declaration import Assembly, Joint
-from tolcontact.discretization.fixed_contact import ContactPoints
+from tolcontact.discretization.fixed_contact import ContactPoints, Offsets
 from tolcontact.discretization.locators import NominalPart
-from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.scenes import Scene
-from tolcontact.discretization.weld import Weld
 from tolcontact.elasticity import MAX_OFFSET
 from tolcontact.errors import Faults, GeometryFault, designation
 from tolcontact.features import FaceDeviation, Features
@@ -25,6 +25,25 @@ from tolcontact.geometry.tolerances import ROUNDING
 REACH = 0.1  # of the size of the other part: parts that are further apart are not welded
 PAD_POINTS = 3
 MAX_CONDITION = 1e6  # of the rows of a joint, with lengths in sizes of the part
+
+
+@dataclass(frozen=True, eq=False)
+class Weld:
+    """The rows of a joint: gaps n . (x_m - x_r) between two parts.
+
+    station             that joins the parts
+    moving, reference   indices of the parts in that station
+    P_m, P_r, n_r       (row, 3) points and directions, nominal
+    columns             (row,) inputs of a realization that hold the gaps at the end of the station
+    """
+
+    station: str
+    moving: int
+    reference: int
+    P_m: Float[Array, "row 3"]
+    P_r: Float[Array, "row 3"]
+    n_r: Float[Array, "row 3"]
+    columns: Int[Array, " row"]
 
 
 def welds_and_pairs(
@@ -51,19 +70,17 @@ def welds_and_pairs(
                 inputs += len(made[0].columns)
                 later = [other for other in scenes[number + 1 :] if joint.welded[0] in other.assembly.parts]
                 holding += [*made[1], *(_kept(joint, made[0], scene) for scene in later)]
-    free = [faults.attempt(f'contact pair "{pair.name}"', _without_held_points, pair, holding) for pair in pairs]
+    free = []
+    for pair in pairs:
+        held = [
+            other.P_m if other.moving == pair.moving else other.P_r
+            for other in holding
+            if {other.moving, other.reference} == {pair.moving, pair.reference}
+        ]
+        place = f'contact pair "{pair.name}"'
+        free.append(faults.attempt(place, pair.without, np.concatenate(held), MAX_OFFSET) if held else pair)
     faults.refuse(line.name)
     return tuple(welds), (*free, *holding)
-
-
-def _without_held_points(pair: ContactPoints, holding: Sequence[ContactPoints]) -> ContactPoints:
-    """Return a pair without its contact points where guns or welds hold its parts. Raises GeometryFault if it has no others."""
-    held = [
-        other.P_m if other.moving == pair.moving else other.P_r
-        for other in holding
-        if {other.moving, other.reference} == {pair.moving, pair.reference}
-    ]
-    return pair.without(np.concatenate(held), MAX_OFFSET) if held else pair
 
 
 def _weld(
