@@ -1,9 +1,10 @@
-"""The declarations that an assembly and each of its stations take: locations, contact pairs, forces and measures."""
+"""The declarations that an assembly and each of its stations take; stations, and what each of them holds."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, Literal, TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, ClassVar, Literal, TypeVar
 
-from tolcontact.declaration.contact_pair import ContactPair, Force, Joint
+from tolcontact.declaration.checks import Declaration
+from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, parts_of
 from tolcontact.declaration.locator import Location, Locator, Placing, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import Measurement
@@ -13,6 +14,8 @@ from tolcontact.declaration.values import Direction, direction, script_line, vec
 from tolcontact.user_functions import refuse_in_functions
 
 T = TypeVar("T")
+Line = Any  # the assembly that stations build; its module imports this one
+SETTINGS = {"locations": "locate", "pairs": "contact", "measures": "measure", "forces": "force"}  # lists, and their methods
 
 
 class Declarations:
@@ -163,3 +166,91 @@ def expect(label: str, value: Any, kind: Any, expected: str) -> None:
     """Raise TypeError at the script's own line if an argument has a type that no other check could handle."""
     if not isinstance(value, kind):
         raise TypeError(f"{label} is a {type(value).__name__}; expected {expected}")
+
+
+class Station(Declarations, Declaration):
+    """A step of building or measuring an assembly: `assembly.station(name)` declares it, in the order of the steps.
+
+    Parts and joints are located again in each station; a station that only measures is an inspection. Features belong to parts:
+    their deviations are equal in all stations. A locator is a separate contributor in each station, "weld.panel.A1".
+    """
+
+    name: str
+    declared_at: str
+    noun: ClassVar[str] = "station"
+
+    def __init__(self, name: str, declared_at: str = "") -> None:
+        self.name, self._station, self.declared_at = name, name, declared_at
+        self._assembly: Declarations | None = None
+
+    def belonging_to(self, assembly: Declarations) -> "Station":
+        """Let the station declare into the lists of an assembly, and return it."""
+        self._assembly = assembly
+        return self
+
+    def join(self, name: str, *bodies: Part | Joint, at: Sequence[Point] = (), pad: float | None = None) -> Joint:
+        """Declare that `bodies`, parts or joints of earlier stations, are joined at the end of this station; return the joint.
+
+        `weld.join("rail", left, right)` has the `name` "rail". Later stations locate the joint by points of any of its parts.
+        Elastic parts are joined `at` points of one of them, each over a `pad` [mm] (see Joint).
+        """
+        for body in bodies:
+            expect(f'join "{name}": a body', body, Part | Joint, "parts and joints, as in weld.join(name, left, right)")
+        for point in at:
+            expect(f'join "{name}": a point', point, Point, "part.point(x, y, z)")
+        return self._add("joints", Joint(name, parts_of(bodies), self.name, script_line(), tuple(at), pad))
+
+    @property
+    def assembly(self) -> Any:
+        if self._assembly is None:
+            raise TypeError(f'station "{self.name}" belongs to no assembly; declare it with assembly.station(name)')
+        return self._assembly
+
+    def faults(self) -> Iterator[str]:
+        if not isinstance(self.name, str):
+            yield f"name is {self.name!r}; expected a text"
+
+    def __str__(self) -> str:
+        return f"station {self.name}"
+
+
+def joined_before(line: Line, station: Station) -> dict[Part, Joint]:
+    """Return the joint of each part that is joined when a station begins: the latest one."""
+    names = [earlier.name for earlier in line.stations[: line.stations.index(station)]]
+    # Two joints of one station are a fault; the first one counts.
+    joints = [joint for name in names for joint in reversed(line.joints) if joint.station == name]
+    return {part: joint for joint in joints for part in joint.members}
+
+
+def settings_of(line: Line, station: Station) -> dict[str, list[Any]]:
+    """Return the declarations of a station by the name of their list."""
+    return {name: [thing for thing in getattr(line, name) if thing.station == station.name] for name in SETTINGS}
+
+
+def in_order(line: Line) -> dict[str, list[Any]]:
+    """Return the declarations of all stations by the name of their list, station by station."""
+    of_stations = [settings_of(line, station) for station in line.stations]
+    return {name: [thing for settings in of_stations for thing in settings[name]] for name in SETTINGS}
+
+
+def present_parts(line: Line, station: Station) -> tuple[Part, ...]:
+    """Return the parts in a station: those that it locates, with all parts of their joints, and fixed ones that it mentions.
+
+    Parts that no station holds are in the first one.
+    """
+    present = _held_parts(line, station)
+    if station is line.stations[0]:
+        held = {part for other in line.stations for part in _held_parts(line, other)}
+        present |= {part for part in line.parts if part not in held}
+    return tuple(part for part in line.parts if part in present)
+
+
+def _held_parts(line: Line, station: Station) -> set[Part]:
+    joined, settings = joined_before(line, station), settings_of(line, station)
+    located = {
+        part
+        for location in settings["locations"]
+        for part in (joined[location.part].members if location.part in joined else (location.part,))
+    }
+    mentioned = {part for things in settings.values() for thing in things for part in thing.parts}
+    return {part for part in line.parts if part in located or (part.fixed is True and part in mentioned)}

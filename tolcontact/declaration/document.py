@@ -8,7 +8,7 @@ from typing import Any, get_args
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
+from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.checks import NOT_NEGATIVE, text_type
 from tolcontact.declaration.codec import Document, Items, Plain, definitions, floats
 from tolcontact.declaration.dependence import Variable
@@ -16,6 +16,7 @@ from tolcontact.declaration.entries import CONTROL, ELASTIC, METHOD, RECORDS, TA
 from tolcontact.declaration.face_entries import Writing
 from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.measure import Tape
+from tolcontact.declaration.model_faults import MAX_COUNTS
 from tolcontact.declaration.part import Face, Standard
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.size import Size
@@ -109,9 +110,9 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
         of_part = replace(place["parts"][k]["features"], part=part)
         for number, item in enumerate(of_part.converted(entry.get("features", []), list[Any])):
             part.add(TOLERANCED.decode(item, of_part[number], part=part))
-        for targets in Items(TARGETS).decode(entry.get("datum_targets", []), place["parts"][k]["datum_targets"]):
-            part.add(targets)
-        part._elastics.extend(Items(ELASTIC).decode(entry.get("elastic", []), place["parts"][k]["elastic"]))
+        for name, record in (("datum_targets", TARGETS), ("elastic", ELASTIC)):
+            for declared in Items(record).decode(entry.get(name, []), place["parts"][k][name]):
+                part.add(declared)
 
     things: dict[str, Any] = {"parts": parts}
     for name in [name for name in RECORDS if name not in ("parts", "measures")]:

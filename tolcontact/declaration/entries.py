@@ -14,18 +14,17 @@ from msgspec import Meta
 from tolcontact.declaration.checks import NOT_NEGATIVE, POSITIVE, text_type
 from tolcontact.declaration.codec import CODECS, Choice, Document, Items, Plain, floats
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
+from tolcontact.declaration.declarations import Station
 from tolcontact.declaration.dependence import Correlation, Variable
-from tolcontact.declaration.elastic import Elastic
 from tolcontact.declaration.face_entries import FREE_DIRECTION, MEASURED, UNIT_VECTOR, Writing, feature_named
 from tolcontact.declaration.feature_tolerance import KINDS, GeometricTolerance
-from tolcontact.declaration.geometry import Box, Mesh, Pin
+from tolcontact.declaration.geometry import Box, Elastic, Mesh, Pin
 from tolcontact.declaration.locator import USUAL_STIFFNESS, Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, tape_of
+from tolcontact.declaration.measured_table import Population
 from tolcontact.declaration.part import DatumTargets, Face, Feature, Part, Pattern
 from tolcontact.declaration.place import Place
-from tolcontact.declaration.population import Population
 from tolcontact.declaration.record import Field, Record
-from tolcontact.declaration.sequence import Station
 from tolcontact.declaration.size import Form, Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
