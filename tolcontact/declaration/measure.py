@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from tolcontact.declaration.checks import TRUTH, Declaration, direction_faults
+from tolcontact.declaration.codec import Place
 from tolcontact.declaration.geometry import UNITS
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Part, Point
-from tolcontact.declaration.place import Place
 from tolcontact.declaration.values import Vector, is_length, is_line
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 from tolcontact.tables import MAX_NUMBER

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.declaration.geometry import UNITS
-from tolcontact.declaration.tolerance_class import RANGES, WIDTHS
+from tolcontact.declaration.written_tolerance import RANGES, WIDTHS
 
 MIN_ZONES, MAX_ZONES = 0.1, 5.0  # widths of a zone: six standard deviations, and the distance of a mean, of plausible parts
 MAX_SIZE_SHARE = 0.5  # of a nominal size: what can be no deviation from it

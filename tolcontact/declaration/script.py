@@ -16,11 +16,11 @@ from types import MappingProxyType
 from typing import Any
 
 from tolcontact.declaration import Assembly
+from tolcontact.declaration.codec import EntryError, Sources
 from tolcontact.declaration.document import assembly_of, json_schema, to_document
 from tolcontact.declaration.geometry import Mesh
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face
-from tolcontact.declaration.place import EntryError, Sources
 from tolcontact.errors import ScriptError, TolcontactError, nearest_name
 from tolcontact.input_files import fault_of
 from tolcontact.replacing import replacing

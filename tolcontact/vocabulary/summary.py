@@ -39,78 +39,70 @@ STATISTIC_VALUE = variable(
     "f8 statistic_value(measure, state, statistic, interval)", "estimate, in the measure's units; shares are of 1"
 )
 CHANGE = variable("f8 change(measure, change_of, interval)", "corrected against raw measures, from the same realizations")
-TOUCHED = variable("f8 touched(interval)", "share of realizations that contact touched", "1")
-BY_STATUS = variable("i8 by_status(status_meaning)", "number of realizations", "1")
-NOT_ASSEMBLABLE_SHARE = variable(
-    "f8 not_assemblable(interval)", "share of realizations without a pose free of penetration", "1"
-)
-CONFLICTS = variable("i8 conflicts(pair)", "number of these realizations with a pair in conflict", "1")
-CARRIED = variable("f8 carried(pair, interval)", "share of realizations with a pair in contact", "1")
+TOUCHED = variable("f8 touched(interval) [1]", "share of realizations that contact touched")
+BY_STATUS = variable("i8 by_status(status_meaning) [1]", "number of realizations")
+NOT_ASSEMBLABLE_SHARE = variable("f8 not_assemblable(interval) [1]", "share of realizations without a pose free of penetration")
+CONFLICTS = variable("i8 conflicts(pair) [1]", "number of these realizations with a pair in conflict")
+CARRIED = variable("f8 carried(pair, interval) [1]", "share of realizations with a pair in contact")
 PAIR_REACTION = variable("f8 reaction(pair, of_reaction, interval)", "mean and percentiles of a pair's reaction")
 CARRIED_TOGETHER = variable(
-    "f8 together(combination, interval)", "share of realizations with exactly these pairs in contact", "1"
+    "f8 together(combination, interval) [1]", "share of realizations with exactly these pairs in contact"
 )
-STEPS = variable("f8 iterations(of_iterations)", "linear steps of the realizations that contact touched", "1")
-WATCHED = variable("i8 watched()", "number of realizations whose bodies were all tested for interference", "1")
+STEPS = variable("f8 iterations(of_iterations) [1]", "linear steps of the realizations that contact touched")
+WATCHED = variable("i8 watched() [1]", "number of realizations whose bodies were all tested for interference")
 CLASH_SHARE = variable(
-    "f8 clash_share(interval)",
+    "f8 clash_share(interval) [1]",
     "share of these realizations with interference of parts without declared contact; NaN: none was tested",
-    "1",
 )
-CLASH_COUNT = variable("i8 clash_count(clash)", "number of realizations whose deepest interference is between two parts", "1")
-CLASH_LARGEST_DEPTH = variable("f8 clash_largest_depth(clash)", "their largest depth of interference; NaN: not measured", "mm")
-CLASH_DECLARED = variable("i1 clash_declared(clash)", "1: their contact is declared, and these realizations are doubtful", "1")
+CLASH_COUNT = variable("i8 clash_count(clash) [1]", "number of realizations whose deepest interference is between two parts")
+CLASH_LARGEST_DEPTH = variable("f8 clash_largest_depth(clash) [mm]", "their largest depth of interference; NaN: not measured")
+CLASH_DECLARED = variable("i1 clash_declared(clash) [1]", "1: their contact is declared, and these realizations are doubtful")
 OFFSET = variable(
-    "f8 locator_offset(part, of_offset, interval)",
+    "f8 locator_offset(part, of_offset, interval) [mm]",
     "how far contact moved a part off its rigid two-sided locators; NaN: it has none, or cannot move",
-    "mm",
 )
-OFFSET_BEYOND = variable("f8 offset_beyond(part, interval)", "share of realizations with more than these locators vary", "1")
+OFFSET_BEYOND = variable("f8 offset_beyond(part, interval) [1]", "share of realizations with more than these locators vary")
 OFFSET_UNEXPLAINED = variable(
-    "f8 offset_unexplained(part, interval)",
+    "f8 offset_unexplained(part, interval) [1]",
     "share of realizations that are certified with more than these locators vary and parts penetrated without contact",
-    "1",
 )
 BY_OTHER_OBJECTIVE = variable(
     "f8 change_by_objective(by_objective, measure, change_of, interval)",
     "corrected measures under another objective against the objective of the run, from the same realizations",
 )
 COMPARED_BY_OBJECTIVE = variable(
-    "i8 compared_by_objective(by_objective)", "number of these realizations: certified under both objectives", "1"
+    "i8 compared_by_objective(by_objective) [1]", "number of these realizations: certified under both objectives"
 )
-PENETRATION = variable("f8 penetration(state)", "largest true penetration of any contact point", "mm")
+PENETRATION = variable("f8 penetration(state) [mm]", "largest true penetration of any contact point")
 DEEPEST_SURFACE = variable(
-    "f8 surface_penetration()", "largest depth of a face in the other body, of the realizations that were checked", "mm"
+    "f8 surface_penetration() [mm]", "largest depth of a face in the other body, of the realizations that were checked"
 )
 FARTHEST_BESIDE = variable(
-    "f8 beside()", "largest distance of touching contact points outside the face, of the realizations checked", "mm"
+    "f8 beside() [mm]", "largest distance of touching contact points outside the face, of the realizations checked"
 )
 DEEPEST_FALSE_CONTACT = variable(
-    "f8 false_contact(pair)",
+    "f8 false_contact(pair) [mm]",
     "largest depth of contact points in the raw state where the surfaces were apart, of the realizations that were checked",
-    "mm",
 )
 PENETRATING_SHARE = variable(
-    "f8 penetrating_share(interval)",
+    "f8 penetrating_share(interval) [1]",
     "share of realizations with penetration of surfaces by more than 1 % of the smallest tolerance range",
-    "1",
 )
 FALSE_CONTACT_SHARE = variable(
-    "f8 false_contact_share(interval)",
+    "f8 false_contact_share(interval) [1]",
     "share of realizations with resolved contact of more than that depth where the surfaces are apart",
-    "1",
 )
-CONTACTS_CHECKED = variable("f8 contacts()", "number of touching contact points, of the realizations that were checked", "1")
+CONTACTS_CHECKED = variable("f8 contacts() [1]", "number of touching contact points, of the realizations that were checked")
 CONTACTS_WITHOUT_FACE = variable(
-    "f8 contacts_ended()", "number of these that touch a plane where its face has ended; NaN if that is not known", "1"
+    "f8 contacts_ended() [1]", "number of these that touch a plane where its face has ended; NaN if that is not known"
 )
-SURFACES_CHECKED = variable("i8 surfaces_checked()", "number of realizations that were checked against the surfaces", "1")
+SURFACES_CHECKED = variable("i8 surfaces_checked() [1]", "number of realizations that were checked against the surfaces")
 FIELD_EXTREME = variable(
-    "f8 field_extreme(part, state, extreme, interval)", "least and largest 6 sigma of the displacement magnitude", "mm"
+    "f8 field_extreme(part, state, extreme, interval) [mm]", "least and largest 6 sigma of the displacement magnitude"
 )
-REALIZATIONS_IN_FIELDS = variable("i8 field_realizations()", "number of realizations that the displacement fields cover", "1")
+REALIZATIONS_IN_FIELDS = variable("i8 field_realizations() [1]", "number of realizations that the displacement fields cover")
 REALIZATIONS_IN_MAGNITUDES = variable(
-    "i8 magnitude_realizations()", "number of realizations that the magnitudes of the displacement fields cover", "1"
+    "i8 magnitude_realizations() [1]", "number of realizations that the magnitudes of the displacement fields cover"
 )
 
 COMPARED_LABELS = (
@@ -119,13 +111,13 @@ COMPARED_LABELS = (
     label(EXTENT, "median, or largest, of all realizations"),
 )
 COMPARED = (
-    variable("f8 seconds(solver)", "wall time of all realizations, from draws to measures", "s"),
+    variable("f8 seconds(solver) [s]", "wall time of all realizations, from draws to measures"),
     replace(BY_STATUS, dims=(SOLVER, STATUS_MEANING)),
-    variable("f8 kkt_residual(solver)", "largest KKT residual of the certified realizations", "mm"),
-    variable("f8 penetration(solver)", "largest true penetration left", "mm"),
-    variable("f8 pose_difference(solver, extent)", "largest distance between both answers, corners of bounding boxes", "mm"),
+    variable("f8 kkt_residual(solver) [mm]", "largest KKT residual of the certified realizations"),
+    variable("f8 penetration(solver) [mm]", "largest true penetration left"),
+    variable("f8 pose_difference(solver, extent) [mm]", "largest distance between both answers, corners of bounding boxes"),
     variable("f8 measure_difference(solver, extent, measure)", "difference of a measure, in its own units"),
-    variable("i8 both_resolved(solver)", "number of realizations that the differences cover", "1"),
+    variable("i8 both_resolved(solver) [1]", "number of realizations that the differences cover"),
 )
 
 SAME_DRAWS, SAME_SEED, OTHER_DRAWS = "same", "same seed", "other"
