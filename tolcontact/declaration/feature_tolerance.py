@@ -288,9 +288,7 @@ Position = ToleranceKind(
     (*AXIS_OPTIONS, "projected"),
 )  # fmt: skip
 Coaxiality = ToleranceKind(
-    "coaxiality",
-    "coaxiality of an axis with the axis of its datums: a round zone (ISO 1101, 17.13)",
-    ("material", "combined"),
+    "coaxiality", "coaxiality of an axis with the axis of its datums: a round zone (ISO 1101, 17.13)", ("material", "combined")
 )
 Symmetry = ToleranceKind(
     "symmetry", "symmetry of the middle of two opposed planes, or of an axis between planes, to its datums (ISO 1101, 17.14)",
