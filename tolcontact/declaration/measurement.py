@@ -64,7 +64,8 @@ class Measurement(Readable):
         return {self.units}
 
     def faults(self) -> Iterator[str]:
-        for thing in (*self.faces, *self.points, *self._nested):
+        things: tuple[Face | Point | Measurement, ...] = (*self.faces, *self.points, *self._nested)
+        for thing in things:
             yield from thing.faults()
 
     def _take_faces(self, *names: str) -> None:

@@ -84,7 +84,6 @@ class Tolerance(Readable):
                 yield f"{option} is given, which goes with a normal distribution; leave it out"
         if self.cpk is not None and (self.cp is None or (is_length(self.cpk) and is_length(self.cp) and self.cpk > self.cp)):
             yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk not above it"
-
         yield from side_faults(self.side, self.cpk)
         yield from parts_faults(self.parts, self.distribution)
 
