@@ -16,7 +16,7 @@ from tolcontact.declaration.declarations import (
     present_parts,
     settings_of,
 )
-from tolcontact.declaration.dependence import Correlation, CorrelationKind, Variable, correlation
+from tolcontact.declaration.dependence import Correlation, CorrelationKind, Variable
 from tolcontact.declaration.geometry import UNITS, Geometry, Unit
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
@@ -26,7 +26,7 @@ from tolcontact.declaration.part import Feature, Part, Standard
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
-from tolcontact.declaration.values import Mirror, Vector, script_line, text_faults, vector as _vector
+from tolcontact.declaration.values import Mirror, Vector, is_length, script_line, text_faults, vector as _vector
 from tolcontact.declaration.written_tolerance import TextFault, written
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
@@ -73,15 +73,9 @@ class Assembly(Declarations, Pictured, Checked):
     overlaps = Declared[Overlap]()
 
     def __init__(
-        self,
-        name: str,
-        *,
-        method: Method | None = None,
-        title_block: TitleBlock | None = None,
-        mu: float | None = None,
-        standard: Standard = "",
-        units: str = "mm",
-    ) -> None:
+        self, name: str, *, method: Method | None = None, title_block: TitleBlock | None = None, mu: float | None = None,
+        standard: Standard = "", units: str = "mm",
+    ) -> None:  # fmt: skip
         for option, value, kind in (("method", method, Method), ("title_block", title_block, TitleBlock)):
             expect(f'assembly "{name}": {option}', value, kind | None, f"tc.{kind.__name__}(...)")
         self.name, self.method, self.title_block = name, method, title_block
@@ -131,16 +125,9 @@ class Assembly(Declarations, Pictured, Checked):
         return tuple(feature for part in self.parts for feature in part.features)
 
     def part(
-        self,
-        name: str,
-        geometry: Geometry,
-        *,
-        at: Any = (0, 0, 0),
-        rotation: Any = (0, 0, 0),
-        fixed: bool | None = None,
-        standard: Standard = "",
-        mirror: Mirror = "",
-    ) -> Part:
+        self, name: str, geometry: Geometry, *, at: Any = (0, 0, 0), rotation: Any = (0, 0, 0), fixed: bool | None = None,
+        standard: Standard = "", mirror: Mirror = "",
+    ) -> Part:  # fmt: skip
         """Declare a part (see Part).
 
         name       of the part; it also names groups of archives
@@ -199,12 +186,10 @@ class Assembly(Declarations, Pictured, Checked):
             except TextFault as fault:
                 raise ValueError(f'variable "{name}": tolerance is {tolerance!r}; {fault}') from fault
         by_name = {part.name if isinstance(part, Part) else part: alpha for part, alpha in (expands or {}).items()}
-        variable = Variable(
+        return self._add("variables", Variable(
             name=name, tolerance=_tolerance(tolerance), drives=dict(drives or {}), units=units, nominal=nominal,
-            declared_at=script_line(), expands=by_name,
-            loads=dict(loads or {}),
-        )  # fmt: skip
-        return self._add("variables", variable)
+            declared_at=script_line(), expands=by_name, loads=dict(loads or {}),
+        ))  # fmt: skip
 
     def correlate(self, labels: Sequence[str], matrix: Any, *, kind: CorrelationKind = "copula") -> Correlation:
         """Declare that contributors with these `labels` are correlated: a `matrix`, or one coefficient for two of them.
@@ -212,7 +197,12 @@ class Assembly(Declarations, Pictured, Checked):
         `kind` is what the coefficients are of: "copula" (default), "pearson" or "rank" (see Correlation).
         `model.correlate(["top.A1", "top.A2"], 0.5)`
         """
-        return self._add("correlations", correlation(labels, matrix, script_line(), kind))
+        coefficients = [[1.0, matrix], [matrix, 1.0]] if is_length(matrix) else matrix
+        try:
+            rows = tuple(tuple(float(number) for number in row) for row in coefficients)
+        except (TypeError, ValueError):  # faults() reports it
+            rows = ()
+        return self._add("correlations", Correlation(tuple(labels), rows, script_line(), kind))
 
     def population(
         self, source: Any, columns: Mapping[str, str] | None = None, *, absolute: bool = False, units: Unit = "mm",

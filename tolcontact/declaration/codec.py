@@ -101,8 +101,8 @@ class Place:
             actual = "named values"
         elif isinstance(value, list | tuple):
             actual = f"a list of {len(value)}"
-        elif isinstance(value, str):
-            actual = repr(value) if len(value) <= 40 else "a text"
+        elif isinstance(value, str) and len(value) > 40:
+            actual = "a text"
         elif isinstance(value, int) and abs(value) > MAX_NUMBER:
             actual = "a huge number"  # Python refuses to print whole numbers of more than 4300 digits
         else:
@@ -189,13 +189,10 @@ class Plain(Codec):
     """
 
     def __init__(
-        self,
-        annotation: Any,
-        write: Callable[[Any, Any], Any] = lambda value, writing: value,
+        self, annotation: Any, write: Callable[[Any, Any], Any] = lambda value, writing: value,
         read: Callable[[Any, Place], Any] = lambda value, place: value,
-        when: Callable[[Any, Any], bool] = lambda value, writing: True,
-        are_finite: bool = True,
-    ) -> None:
+        when: Callable[[Any, Any], bool] = lambda value, writing: True, are_finite: bool = True,
+    ) -> None:  # fmt: skip
         self.wire, self.write, self.read, self.when, self.are_finite = _wire(annotation), write, read, when, are_finite
 
     def encode(self, value: Any, writing: Writing) -> Any:

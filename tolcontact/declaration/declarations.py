@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, ClassVar, Literal, TypeVar
 
 from tolcontact.declaration.checks import Declaration
-from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, parts_of
+from tolcontact.declaration.contact_pair import ContactPair, Force, Joint
 from tolcontact.declaration.locator import Location, Locator, Placing, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import Measurement
@@ -35,15 +35,9 @@ class Declarations:
         return thing
 
     def locate(
-        self,
-        part: Part | Joint,
-        scheme: ThreeTwoOne | Sequence[Locator],
-        *,
-        tolerance: Any = None,
-        on: Part | Feature | Joint | None = None,
-        floating: bool = False,
-        placing: Placing = "first order",
-    ) -> Location:
+        self, part: Part | Joint, scheme: ThreeTwoOne | Sequence[Locator], *, tolerance: Any = None,
+        on: Part | Feature | Joint | None = None, floating: bool = False, placing: Placing = "first order",
+    ) -> Location:  # fmt: skip
         """Locate a part by six locators, or by fewer if it is floating (see Location).
 
         part        the part; or a joint, which is located by points of its parts
@@ -66,25 +60,16 @@ class Declarations:
         zone = None if tolerance is None else _tolerance(tolerance)
         expect(f'locate "{part.name}": floating', floating, bool, "True or False")
         joint, part = (part.name, part.first) if isinstance(part, Joint) else ("", part)
-        ground = on.first if isinstance(on, Joint) else on
-        location = Location(
-            part=part, scheme=scheme, tolerance=zone, on=ground, declared_at=script_line(), floating=floating,
-            station=self._station, joint=joint, placing=placing,
-        )  # fmt: skip
-        return self._add("locations", location)
+        return self._add("locations", Location(
+            part=part, scheme=scheme, tolerance=zone, on=on.first if isinstance(on, Joint) else on, declared_at=script_line(),
+            floating=floating, station=self._station, joint=joint, placing=placing,
+        ))  # fmt: skip
 
     def contact(
-        self,
-        name: str,
-        *,
-        moving: Face | Feature,
-        reference: Face | Feature,
-        points: int | Literal["vertices"] | None = None,
-        spacing: float | None = None,
-        within: float | None = None,
-        mu: float | None = None,
-        stiffness: float | None = None,
-    ) -> ContactPair:
+        self, name: str, *, moving: Face | Feature, reference: Face | Feature,
+        points: int | Literal["vertices"] | None = None, spacing: float | None = None, within: float | None = None,
+        mu: float | None = None, stiffness: float | None = None,
+    ) -> ContactPair:  # fmt: skip
         """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair).
 
         name        of the pair
@@ -100,11 +85,10 @@ class Declarations:
         """
         for side, face in (("moving", moving), ("reference", reference)):
             expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
-        pair = ContactPair(
+        return self._add("pairs", ContactPair(
             name=name, moving=face_of(moving), reference=face_of(reference), points=points, spacing=spacing, within=within,
             mu=mu, stiffness=stiffness, declared_at=script_line(), station=self._station,
-        )  # fmt: skip
-        return self._add("pairs", pair)
+        ))  # fmt: skip
 
     def force(self, name: str, *, at: Point, vector: Any, tolerance: Any = None) -> Force:
         """Declare a force, which acts with the objective "seating" (see Force).
@@ -123,17 +107,10 @@ class Declarations:
         return self._add("forces", Force(name=name, at=at, vector=_vector(vector), declared_at=line, station=station))
 
     def measure(
-        self,
-        name: str,
-        of: Point | Measurement | Callable[[Any], Any],
-        *,
-        to: Point | None = None,
-        along: Direction | None = None,
-        tolerance: Any = None,
-        limits: Sequence[float | None] | None = None,
-        absolute: bool | None = None,
-        units: str | None = None,
-    ) -> Measure:
+        self, name: str, of: Point | Measurement | Callable[[Any], Any], *, to: Point | None = None,
+        along: Direction | None = None, tolerance: Any = None, limits: Sequence[float | None] | None = None,
+        absolute: bool | None = None, units: str | None = None,
+    ) -> Measure:  # fmt: skip
         """Declare a measure (see Measure).
 
         name        of the measure
@@ -155,11 +132,10 @@ class Declarations:
             is_plain = isinstance(of, Point) or (isinstance(of, Measurement) and not of.names)
             units = self.assembly.units if units == "mm" and is_plain else units
         bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
-        measure = Measure(
+        return self._add("measures", Measure(
             name, of, to=to, along=axis, tolerance=tolerance, units=units, limits=bounds, absolute=absolute,
             declared_at=script_line(), station=self._station,
-        )  # fmt: skip
-        return self._add("measures", measure)
+        ))  # fmt: skip
 
 
 def expect(label: str, value: Any, kind: Any, expected: str) -> None:
@@ -198,7 +174,8 @@ class Station(Declarations, Declaration):
             expect(f'join "{name}": a body', body, Part | Joint, "parts and joints, as in weld.join(name, left, right)")
         for point in at:
             expect(f'join "{name}": a point', point, Point, "part.point(x, y, z)")
-        return self._add("joints", Joint(name, parts_of(bodies), self.name, script_line(), tuple(at), pad))
+        parts = tuple(part for body in bodies for part in (body.members if isinstance(body, Joint) else (body,)))
+        return self._add("joints", Joint(name, parts, self.name, script_line(), tuple(at), pad))
 
     @property
     def assembly(self) -> Any:

@@ -270,8 +270,8 @@ class Combination(Measurement):
             if not isinstance(value, str | Measurement):
                 raise TypeError(f"{self.kind}: {type(operand).__name__} is no measurement; expected one, or the name of one")
             operands.append(value)
-        object.__setattr__(self, "measurements", tuple(operands))
-        object.__setattr__(self, "depth", 1 + max((nested.depth for nested in self._nested), default=0))
+        vars(self)["measurements"] = tuple(operands)
+        vars(self)["depth"] = 1 + max((nested.depth for nested in self._nested), default=0)
         if self.depth > MAX_DEPTH:
             raise ValueError(f"{self.kind}: measurements are nested more than {MAX_DEPTH} deep; declare some as measures")
 

@@ -58,21 +58,11 @@ class Record(Codec):
     """
 
     def __init__(
-        self,
-        cls: Any,
-        *,
-        mark: str = "",
-        marked: int = 1,
-        kind: str = "",
-        fields: str = "",
-        keys: Mapping[str, str] = MappingProxyType({}),
-        omitted: str = "",
-        floats: str = "",
-        name: str = "",
-        build: Callable[..., Any] | None = None,
-        when: Callable[[Any, Any], bool] = lambda thing, writing: True,
+        self, cls: Any, *, mark: str = "", marked: int = 1, kind: str = "", fields: str = "",
+        keys: Mapping[str, str] = MappingProxyType({}), omitted: str = "", floats: str = "", name: str = "",
+        build: Callable[..., Any] | None = None, when: Callable[[Any, Any], bool] = lambda thing, writing: True,
         **codecs: Codec | Field,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.cls, self.mark, self.kind, self.build, self.name = cls, mark, kind, build or cls, name or cls.__name__
         self.wire, self.when, self._codecs = reference(self.name), when, codecs
         self.names, self._marked = fields.split() or list(inspect.signature(cls).parameters), marked if mark else 0

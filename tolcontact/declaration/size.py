@@ -58,8 +58,7 @@ class Size(Checked):
             if isinstance(self.upper, str) and (stated := tolerance_class(self.upper.strip())):
                 object.__setattr__(self, "tolerance_class", str(stated))
             lower, upper = value if isinstance(value, Deviations) else (-value if is_length(value) else None, value)
-            object.__setattr__(self, "lower", lower)
-            object.__setattr__(self, "upper", upper)
+            vars(self).update(lower=lower, upper=upper)
 
     @property
     def tolerance(self) -> Tolerance:
