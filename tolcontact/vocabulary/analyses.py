@@ -8,14 +8,16 @@ from tolcontact.vocabulary.labels import (
     AXES,
     AXIS,
     BODY_AXIS,
+    ESTIMATE,
+    INTERVAL,
+    OUTSIDE,
     STATE,
     STATES,
     STATUS_MEANING,
     STATUS_MEANINGS,
     ArchiveVariable,
     variable,
-)  # fmt: skip
-from tolcontact.vocabulary.summary import ESTIMATE, INTERVAL, OUTSIDE
+)
 
 ANALYSES_GROUP = "statistics"  # the group of an archive that holds a group for each analysis
 GroupedBy = Literal["contributor", "feature", "part"]

@@ -20,7 +20,7 @@ from tolcontact.vocabulary.labels import (
     label,
     surface_variables,
     variable,
-)  # fmt: skip
+)
 from tolcontact.vocabulary.variation import DEVIATION
 
 BREP_FACE, ROUND_POINT = "brep_face", "round_point"
