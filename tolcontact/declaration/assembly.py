@@ -317,8 +317,10 @@ class Assembly(Declarations, Pictured, Checked):
         """Yield the faults of the declarations, among them omissions: sentences that name a declaration and its script line."""
         if not (self.parts or self.variables):
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
-        yield from (*omissions(self), *text_faults("assembly", [self.name]), *super().faults())
-        yield from (*setting_faults(self), *declaration_faults(self))
+        yield from omissions(self)
+        yield from (*text_faults("assembly", [self.name]), *super().faults())
+        yield from setting_faults(self)
+        yield from declaration_faults(self)
 
     def __str__(self) -> str:
         causes = *self.variables, *self.correlations, *self.populations

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import ClassVar, Literal, TypeVar, get_args
 
@@ -236,11 +237,10 @@ class Feature(Toleranced):
         return Point(self.part, None, self, end)
 
     def faults(self) -> Iterator[str]:
-        yield from (*self.face_faults(), *letter_faults(self.datum), *super().faults())
+        yield from chain(self.face_faults(), letter_faults(self.datum), super().faults())
         yield from self.tolerance_faults(len(self.faces))
 
     def face_faults(self) -> Iterator[str]:
-        """Yield the faults of the faces alone."""
         for face in self.faces:
             yield from face.faults()
             if face.part is not self.part:
