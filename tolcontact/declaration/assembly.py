@@ -298,10 +298,8 @@ class Assembly(Declarations, Pictured, Checked):
         The width of a scipy.stats distribution is six standard deviations. A width below a thousandth of the widest one
         counts as a constant, and is left out.
         """
-        zones = []
-        for location in self.locations:
-            scheme = [locator.tolerance for locator in location.scheme] if isinstance(location.scheme, tuple) else [None]
-            zones += [zone or location.tolerance for zone in scheme]
+        zones = [locator.tolerance or location.tolerance for location in self.locations for locator in location.locators]
+        zones += [location.tolerance for location in self.locations if location.faces]
         widths = [zone.width for zone in zones if zone is not None]
         sound = [control for feature in self.features for control in feature.tolerances if not any(control.faults())]
         widths += [control.tolerance.width if isinstance(control, Size) else float(control.width) for control in sound]
