@@ -206,8 +206,7 @@ def settings_of(line: Line, station: Station) -> dict[str, list[Any]]:
 
 def in_order(line: Line) -> dict[str, list[Any]]:
     """Return the declarations of all stations by the name of their list, station by station."""
-    of_stations = [settings_of(line, station) for station in line.stations]
-    return {name: [thing for settings in of_stations for thing in settings[name]] for name in SETTINGS}
+    return {name: [thing for station in line.stations for thing in settings_of(line, station)[name]] for name in SETTINGS}
 
 
 def present_parts(line: Line, station: Station) -> tuple[Part, ...]:

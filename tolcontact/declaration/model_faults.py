@@ -146,12 +146,11 @@ def _station_faults(line: Line, station: Station) -> Iterator[str]:
     bodies: dict[Joint | Part, Location] = {}
     for location in settings["locations"]:
         yield from location.located_faults(_locating_faults(location, joined, station))
-        body = joined.get(location.part, location.part)
-        if body in bodies:
-            earlier = bodies[body].declared_at or "an earlier location"
-            place = location.designation
-            yield f'{place}: station "{station.name}" locates it twice, first in {earlier}; locate it once'
-        bodies.setdefault(body, location)
+        first = bodies.setdefault(joined.get(location.part, location.part), location)
+        if first is not location:
+            line_of_first = first.declared_at or "an earlier location"
+            fault = f'station "{station.name}" locates it twice, first in {line_of_first}; locate it once'
+            yield f"{location.designation}: {fault}"
     present = present_parts(line, station)
     for things in settings.values():
         for thing in things:
