@@ -2,7 +2,7 @@
 
 import inspect
 import operator
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, replace
 from functools import cached_property, reduce
 from types import MappingProxyType, NoneType
@@ -34,12 +34,6 @@ class Field:
     is_nullable: bool = False
     is_required: bool = False
     default: Any = UNSET
-
-    def members(self) -> Iterator[tuple[str, Any] | tuple[str, Any, Any]]:
-        """Yield the names, types and defaults of its keys, for msgspec."""
-        for key, codec in self.codecs.items():
-            wire = codec.wire | None if self.is_nullable else codec.wire
-            yield (key, wire) if self.is_required else (key, wire | UnsetType, UNSET)
 
 
 class Record(Codec):
@@ -118,8 +112,13 @@ class Record(Codec):
     @cached_property
     def struct(self) -> Any:
         """The type of an entry for msgspec."""
-        kind = [("kind", Annotated[str, Meta(extra_json_schema={"const": self.kind})])] if self.kind else []
-        members = [*kind, *(member for field in self.fields for member in field.members())]
+        members: list[Any] = []
+        if self.kind:
+            members.append(("kind", Annotated[str, Meta(extra_json_schema={"const": self.kind})]))
+        for field in self.fields:
+            for key, codec in field.codecs.items():
+                wire = codec.wire | None if field.is_nullable else codec.wire
+                members.append((key, wire) if field.is_required else (key, wire | UnsetType, UNSET))
         return msgspec.defstruct(self.name, members, forbid_unknown_fields=True, kw_only=True)
 
     def encode(self, value: Any, writing: Writing) -> Document:
