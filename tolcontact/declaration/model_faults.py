@@ -90,12 +90,12 @@ def _feature_faults(part: Part) -> Iterator[str]:
                     f'{owner}datum "{datum.letter}" ({datum.declared_at}): its target is on feature '
                     f'"{feature.name}", which is no feature of the part; take one of the part'
                 )
-    datums = ", ".join(sorted(set(letters))) or "none"
     for declared in part.toleranced:
         yield from declared.located_faults(owner=owner)
         for tolerance in declared.geometric:
             for letter in tolerance.letters:
                 if letter not in letters:
+                    datums = ", ".join(sorted(set(letters))) or "none"
                     yield (
                         f"{owner}{declared.designation}: {tolerance.kind} refers to datum {letter}, which no feature of the "
                         f'part is; its datums are: {datums}; declare it with part.feature(..., datum="{letter}")'
