@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from tolcontact.compilation import Program
-from tolcontact.declaration.tolerance_class import GRADES, ToleranceClass, UndefinedClass
+from tolcontact.declaration.written_tolerance import GRADES, TextFault, ToleranceClass
 from tolcontact.errors import OptionError
 
 MIN_FACTOR, MAX_FACTOR = 0.1, 3.0  # times the present range, where a cost is no table
@@ -156,7 +156,7 @@ def _width(name: str, key: float | str, size: float | None) -> float:
         raise OptionError(f'cost of "{name}" has "{key}"; grades are for sizes (tc.Size): state full widths in mm')
     try:
         lower, upper = ToleranceClass("h", grade).deviations(size)
-    except UndefinedClass as fault:
+    except TextFault as fault:
         raise OptionError(f'cost of "{name}": {fault}') from None
     return upper - lower
 

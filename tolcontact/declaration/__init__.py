@@ -5,12 +5,13 @@
 
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
+from tolcontact.declaration.declarations import Station
 from tolcontact.declaration.dependence import Correlation, Variable
-from tolcontact.declaration.elastic import Elastic
 from tolcontact.declaration.feature_tolerance import GeometricTolerance
-from tolcontact.declaration.geometry import UNITS, Box, Geometry, Mesh, Pin
+from tolcontact.declaration.geometry import UNITS, Box, Elastic, Geometry, Mesh, Pin
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure, stations
+from tolcontact.declaration.measured_table import Population
 from tolcontact.declaration.measurement import (
     Angle,
     AxisDistance,
@@ -29,9 +30,7 @@ from tolcontact.declaration.measurement import (
     Sum,
 )
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
-from tolcontact.declaration.population import Population
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
-from tolcontact.declaration.sequence import Station
 from tolcontact.declaration.size import Form, Size
 from tolcontact.declaration.stack import Stack
 from tolcontact.declaration.title_block import TitleBlock

@@ -1,34 +1,33 @@
 """The assembly: it collects declarations in the order of a script."""
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import Any, ClassVar, Generic, TypeVar, get_args
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar, Generic, TypeVar, get_args, overload
 
 from tolcontact.declaration.checks import FRICTION, Checked, one_of
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
-from tolcontact.declaration.declarations import expect
-from tolcontact.declaration.dependence import Correlation, Variable
-from tolcontact.declaration.elastic import gravity_faults
-from tolcontact.declaration.geometry import UNITS, Geometry
+from tolcontact.declaration.copies import Plane, mirrored, widened
+from tolcontact.declaration.declarations import (
+    Declarations,
+    Station,
+    expect,
+    in_order,
+    joined_before,
+    present_parts,
+    settings_of,
+)
+from tolcontact.declaration.dependence import Correlation, CorrelationKind, Variable
+from tolcontact.declaration.geometry import UNITS, Geometry, Unit
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.mirroring import Mirroring
+from tolcontact.declaration.measured_table import Gaps, Population, population
+from tolcontact.declaration.model_faults import MAX_COUNTS, declaration_faults, omissions, setting_faults
 from tolcontact.declaration.part import Feature, Part, Standard
-from tolcontact.declaration.population import Population
-from tolcontact.declaration.sequence import Station, in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
-from tolcontact.declaration.values import (
-    Mirror,
-    Vector,
-    group_faults,
-    key_faults,
-    repetitions,
-    script_line,
-    text_faults,
-    vector as _vector,
-)
-from tolcontact.declaration.widening import widened
+from tolcontact.declaration.tolerance import tolerance as _tolerance
+from tolcontact.declaration.values import Mirror, Vector, is_length, script_line, text_faults, vector as _vector
+from tolcontact.declaration.written_tolerance import TextFault, written
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 from tolcontact.user_functions import refuse_in_functions
@@ -36,10 +35,6 @@ from tolcontact.user_functions import refuse_in_functions
 T = TypeVar("T")
 
 CONSTANT_SHARE = 1e-3  # of the widest zone: a narrower one counts as a constant
-MAX_COUNTS = {  # of what an assembly declares
-    "parts": 1000, "locations": 1000, "pairs": 5000, "measures": 2000, "forces": 5000, "variables": 5000, "correlations": 5000,
-    "populations": 1000, "stations": 60, "joints": 1000, "overlaps": 1000,
-}  # fmt: skip
 
 
 class Declared(Generic[T]):
@@ -52,7 +47,7 @@ class Declared(Generic[T]):
         return self if assembly is None else tuple(assembly._declared[self._name])  # type: ignore[return-value]
 
 
-class Assembly(Mirroring, Pictured, Checked):
+class Assembly(Declarations, Pictured, Checked):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
     `tc.Assembly("clamp", mu=0.15)` has the `name` "clamp", which reports and archives show. The methods only record
@@ -78,15 +73,9 @@ class Assembly(Mirroring, Pictured, Checked):
     overlaps = Declared[Overlap]()
 
     def __init__(
-        self,
-        name: str,
-        *,
-        method: Method | None = None,
-        title_block: TitleBlock | None = None,
-        mu: float | None = None,
-        standard: Standard = "",
-        units: str = "mm",
-    ) -> None:
+        self, name: str, *, method: Method | None = None, title_block: TitleBlock | None = None, mu: float | None = None,
+        standard: Standard = "", units: str = "mm",
+    ) -> None:  # fmt: skip
         for option, value, kind in (("method", method, Method), ("title_block", title_block, TitleBlock)):
             expect(f'assembly "{name}": {option}', value, kind | None, f"tc.{kind.__name__}(...)")
         self.name, self.method, self.title_block = name, method, title_block
@@ -136,16 +125,9 @@ class Assembly(Mirroring, Pictured, Checked):
         return tuple(feature for part in self.parts for feature in part.features)
 
     def part(
-        self,
-        name: str,
-        geometry: Geometry,
-        *,
-        at: Any = (0, 0, 0),
-        rotation: Any = (0, 0, 0),
-        fixed: bool | None = None,
-        standard: Standard = "",
-        mirror: Mirror = "",
-    ) -> Part:
+        self, name: str, geometry: Geometry, *, at: Any = (0, 0, 0), rotation: Any = (0, 0, 0), fixed: bool | None = None,
+        standard: Standard = "", mirror: Mirror = "",
+    ) -> Part:  # fmt: skip
         """Declare a part (see Part).
 
         name       of the part; it also names groups of archives
@@ -177,6 +159,98 @@ class Assembly(Mirroring, Pictured, Checked):
         for part in parts:
             expect("may_overlap: an argument", part, Part, "parts, as in may_overlap(shaft, hub)")
         return self._add("overlaps", Overlap(parts, script_line()))
+
+    def variable(
+        self, name: str, tolerance: Any, *, drives: Mapping[str, float] | None = None, units: str = "mm",
+        nominal: float | None = None, expands: Mapping[Part | str, float] | None = None,
+        loads: Mapping[str, float] | None = None,
+    ) -> Variable:  # fmt: skip
+        """Declare a cause that drives several contributors or expands parts, or a dimension that chains measure (see Variable).
+
+        name        of the cause
+        tolerance   full width of its range in its `units`, a text such as "±5 K", or a tc.Tolerance
+        drives      factor [mm per unit] of each contributor, by its label
+        units       of the cause, by default mm
+        nominal     value of a dimension in its `units`, which may drive nothing
+        expands     coefficient of thermal expansion [1/K] of each part, or of its name; deviations are from the temperature
+                    at which dimensions hold
+        loads       factor [N per unit] on the magnitude of each force, by its name
+
+        `model.variable("warmth", 20, drives={"cover.width.size": 0.0007}, units="K")`
+        """
+        for option, factors in (("drives", drives), ("expands", expands), ("loads", loads)):
+            expect(f'variable "{name}": {option}', factors, Mapping | None, f'a factor for each name: {option}={{"name": 0.1}}')
+        if isinstance(tolerance, str) and isinstance(units, str) and units != "mm":
+            try:
+                tolerance = written(tolerance, units=units)
+            except TextFault as fault:
+                raise ValueError(f'variable "{name}": tolerance is {tolerance!r}; {fault}') from fault
+        by_name = {part.name if isinstance(part, Part) else part: alpha for part, alpha in (expands or {}).items()}
+        return self._add("variables", Variable(
+            name=name, tolerance=_tolerance(tolerance), drives=dict(drives or {}), units=units, nominal=nominal,
+            declared_at=script_line(), expands=by_name, loads=dict(loads or {}),
+        ))  # fmt: skip
+
+    def correlate(self, labels: Sequence[str], matrix: Any, *, kind: CorrelationKind = "copula") -> Correlation:
+        """Declare that contributors with these `labels` are correlated: a `matrix`, or one coefficient for two of them.
+
+        `kind` is what the coefficients are of: "copula" (default), "pearson" or "rank" (see Correlation).
+        `model.correlate(["top.A1", "top.A2"], 0.5)`
+        """
+        coefficients = [[1.0, matrix], [matrix, 1.0]] if is_length(matrix) else matrix
+        try:
+            rows = tuple(tuple(float(number) for number in row) for row in coefficients)
+        except (TypeError, ValueError):  # faults() reports it
+            rows = ()
+        return self._add("correlations", Correlation(tuple(labels), rows, script_line(), kind))
+
+    def population(
+        self, source: Any, columns: Mapping[str, str] | None = None, *, absolute: bool = False, units: Unit = "mm",
+        gauge: float | Mapping[str, float] = 0.0, lots: str | None = None, gaps: Gaps = "refused",
+    ) -> Population:  # fmt: skip
+        """Declare that contributors are drawn from measured rows (see Population).
+
+        source    a CSV file, a DataFrame, a Dataset or a mapping of columns, with deviations from nominal values
+        columns   label of the contributor of each column; by default the names of the columns are labels
+        absolute  True: columns of sizes, of features declared before, hold sizes in place of deviations
+        units     of the numbers, by default mm: "um", "in", ...
+        gauge     standard uncertainty of measurement in `units`, or one for each label: its variance is taken off the spread of
+                  the parts; by default it stays in it
+        lots      column with the lot of each row: realizations draw a lot, then a part of it; by default they draw any row
+        gaps      "left out": rows with an empty cell are left out, as a whole; by default they are refused
+
+        `model.population("batch.csv", columns={"block.top.offset": "height"}, units="um")`
+        """
+        expect("population: absolute", absolute, bool, "True or False")
+        sizes = {f"{feature.label}.size": feature.size.nominal for feature in self.features if feature.size}
+        expect("population: lots", lots, str | None, "the name of a column")
+        table = population(
+            source, columns, script_line(), units=units, sizes=sizes if absolute else None, gauge=gauge, lots=lots, gaps=gaps
+        )
+        return self._add("populations", table)
+
+    @overload
+    def mirrored(self, part: Part, /, *, plane: Plane, names: Sequence[str], at: float = 0.0) -> Part: ...
+    @overload
+    def mirrored(self, *parts: Part, plane: Plane, names: Sequence[str], at: float = 0.0) -> tuple[Part, ...]: ...
+    def mirrored(self, *parts: Part, plane: Plane, names: Sequence[str], at: float = 0.0) -> Part | tuple[Part, ...]:
+        """Declare the mirror images of parts, and return them: a part for one, a tuple for several.
+
+        plane   axis of the nominal assembly that is normal to the mirror plane: "x", "y" or "z"
+        names   a text in names of parts, pairs and forces, and the text in its place: ("left", "right") makes "right door" of
+                "left door". A name without the first text gets the second one at its end
+        at      coordinate of the plane on this axis [mm], by default 0
+
+        `right = model.mirrored(left, plane="y", names=("left", "right"))`
+
+        Features, datums, tolerances, forms and elasticity of the parts come with them, and so do their locators on the ground,
+        on a part, or on a feature that is mirrored, too; forces on them; contact pairs and meant overlaps between them. Contact
+        with other parts, measures, joints, and causes of deviations do not, and neither does what is declared later.
+        Coordinates, directions and faces in the frame of an image are the same as in the frame of its part; the mirror makes
+        this frame left-handed. Images have draws of their own; equal deviations give mirrored parts.
+        Raises ValueError or TypeError for wrong arguments.
+        """
+        return mirrored(self, parts, plane, names, at)
 
     def location_of(self, part: Part) -> Location | None:
         """Return the location of `part`; None for a part that is not located."""
@@ -224,10 +298,8 @@ class Assembly(Mirroring, Pictured, Checked):
         The width of a scipy.stats distribution is six standard deviations. A width below a thousandth of the widest one
         counts as a constant, and is left out.
         """
-        zones = []
-        for location in self.locations:
-            scheme = [locator.tolerance for locator in location.scheme] if isinstance(location.scheme, tuple) else [None]
-            zones += [zone or location.tolerance for zone in scheme]
+        zones = [locator.tolerance or location.tolerance for location in self.locations for locator in location.locators]
+        zones += [location.tolerance for location in self.locations if location.faces]
         widths = [zone.width for zone in zones if zone is not None]
         sound = [control for feature in self.features for control in feature.tolerances if not any(control.faults())]
         widths += [control.tolerance.width if isinstance(control, Size) else float(control.width) for control in sound]
@@ -237,104 +309,16 @@ class Assembly(Mirroring, Pictured, Checked):
 
     def omissions(self) -> Iterator[str]:
         """Yield the faults of a model that is not complete yet: declarations that only a run needs."""
-        if not self.measures:
-            yield "it measures nothing; declare at least one measurement with assembly.measure(...)"
-        advice = "it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place"
-        for part in self.parts:
-            if self.location_of(part) is None and part.fixed is not True:
-                yield from part.located_faults(iter([advice]))
+        return omissions(self)
 
     def faults(self) -> Iterator[str]:
         """Yield the faults of the declarations, among them omissions: sentences that name a declaration and its script line."""
         if not (self.parts or self.variables):
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
-        yield from self.omissions()
-        yield from (*text_faults("assembly", [self.name]), *Checked.faults(self))
-        yield from (f"title block: {fault}" for fault in (self.title_block.faults() if self.title_block else ()))
-        yield from gravity_faults(self.acceleration, has_elastic=any(part.elasticity for part in self.parts))
-        for name, most in MAX_COUNTS.items():
-            if (count := len(self._declared[name])) > most:
-                yield f"it has {count} {name}; expected at most {most}"
-        keyed = {"part": "parts", "contact pair": "pairs", "measurement": "measures", "force": "forces"}
-        for kind, name in keyed.items():
-            yield from key_faults(kind, [thing.name for thing in self._declared[name]])
-        yield from group_faults("part", [part.name for part in self.parts])
-        for part in self.parts:
-            yield from part.located_faults()
-            if not self.stations:
-                yield from part.located_faults(self._repetition_faults(part))
-                yield from part.located_faults(self._location_faults(part))
-            yield from self._feature_faults(part)
-        things: tuple[Location | ContactPair | Force | Measure | Overlap, ...] = (
-            *self.locations, *self.pairs, *self.forces, *self.measures, *self.overlaps,
-        )  # fmt: skip
-        for thing in things:
-            yield from thing.located_faults()
-            label = f'locators of "{thing.name}"' if isinstance(thing, Location) else f'{thing.noun} "{thing.name}"'
-            yield from self._unknown_parts(f"{label} ({thing.declared_at})", *thing.parts)
-        for cause in (*self.variables, *self.correlations, *self.populations):
-            yield from cause.located_faults()
-        yield from key_faults("variable", [variable.name for variable in self.variables])
-        for number, measure in enumerate(self.measures):
-            earlier = [other for other in self.measures[:number] if other.station == measure.station]
-            yield from measure.located_faults(measure.reference_faults(earlier))
-        if self.stations:
-            yield from sequence_faults(self)
-            for scene in self.scenes:
-                yield from (fault for part in scene.parts for fault in part.located_faults(scene._location_faults(part)))
-
-    def _feature_faults(self, part: Part) -> Iterator[str]:
-        letters = [declared.datum for declared in part.toleranced if declared.datum] + [datum.letter for datum in part.targets]
-        names = [declared.name for declared in dict.fromkeys((*part.toleranced, *part.features))]
-        yield from key_faults(f'part "{part.name}": feature', names)
-        yield from repetitions(f'part "{part.name}": datum', letters)
-        for datum in part.targets:
-            yield from datum.located_faults(owner=f'part "{part.name}": ')
-            for feature in datum.features:
-                if feature not in part.features:
-                    yield (
-                        f'part "{part.name}": datum "{datum.letter}" ({datum.declared_at}): its target is on feature '
-                        f'"{feature.name}", which is no feature of the part; take one of the part'
-                    )
-        for declared in part.toleranced:
-            yield from declared.located_faults(owner=f'part "{part.name}": ')
-            for tolerance in declared.geometric:
-                for letter in tolerance.letters:
-                    if letter not in letters:
-                        datums = ", ".join(sorted(set(letters))) or "none"
-                        yield (
-                            f'part "{part.name}": {declared.designation}: {tolerance.kind} refers to '
-                            f"datum {letter}, which no feature of the part is; its datums are: {datums}; "
-                            f'declare it with part.feature(..., datum="{letter}")'
-                        )
-
-    def _repetition_faults(self, part: Part) -> Iterator[str]:
-        count = sum(location.part is part for location in self.locations)
-        if count > 1:
-            yield f"it is located {count} times; locate it once"
-
-    def _location_faults(self, part: Part) -> Iterator[str]:
-        location = self.location_of(part)
-        if location is not None and location.floating:
-            body = self.body_of(part)
-            touches = any(side.part in body for pair in self.pairs for side in (pair.moving, pair.reference))
-            if not (touches or location.has_supports):
-                yield (
-                    "it is floating, in no contact pair and on no one-sided locator, so nothing decides its place; "
-                    "declare its contacts"
-                )
-            if part.fixed is True:
-                yield "it is floating, so contact has to move it; leave fixed out"
-        first, *rest = self.support_chain(part)
-        if first in rest:
-            circle = " on ".join(f'"{link.name}"' for link in (first, *rest))
-            yield f"it is located on itself: {circle}; locate one of them on another part, or on the ground"
-
-    def _unknown_parts(self, label: str, *parts: Part | None) -> Iterator[str]:
-        for part in parts:
-            if part is not None and not any(part is member for member in self.parts):
-                names = ", ".join(member.name for member in self.parts) or "none"
-                yield f'{label}: unknown part "{getattr(part, "name", part)}"; the parts of "{self.name}" are: {names}'
+        yield from omissions(self)
+        yield from (*text_faults("assembly", [self.name]), *super().faults())
+        yield from setting_faults(self)
+        yield from declaration_faults(self)
 
     def __str__(self) -> str:
         causes = *self.variables, *self.correlations, *self.populations

@@ -6,8 +6,11 @@ values. Nothing is converted, and nothing in a document is run.
 """
 
 import operator
+import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import reduce
+from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
@@ -15,10 +18,127 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from tolcontact.declaration.place import Place
 from tolcontact.tables import MAX_NUMBER
 
 Document = dict[str, Any]
+MAX_MESSAGE = 300
+MAX_DEPTH = 20  # of values in a document
+PLAIN_TYPES = {
+    "int": "a whole number", "float": "a number", "str": "a text", "bool": "true or false", "array": "a list",
+    "object": "named values", "null": "null",
+}  # fmt: skip
+
+
+class EntryError(Exception):
+    """An entry of a document that a codec cannot read; the message begins with the place of the entry."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """The data for reading a document.
+
+    meshes   meshes by part
+    folder   folder of the shape files; None for a document that may not name files
+    file     name of the document's file
+    parts    parts read before, by name
+    inputs   largest number of inputs of an expression
+    """
+
+    meshes: Mapping[str, Any]
+    folder: Path | None = None
+    file: str = ""
+    parts: dict[str, Any] = field(default_factory=dict)
+    inputs: int = 0
+
+
+@dataclass(frozen=True)
+class Writing:
+    """The data for writing a document.
+
+    triangles   the indices of the triangles of a face
+    tapes       the steps of the users' own expressions, by measure
+    folder      the folder of a JSON model; None for an archive
+    """
+
+    triangles: Callable[[Any], list[int]]
+    tapes: Mapping[str, tuple[tuple[Any, ...], ...]]
+    folder: Path | None = None
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in a document, such as `parts[2].name`.
+
+    part     the part whose features an entry there may name
+    record   the entry in a list of the document that it belongs to
+    """
+
+    sources: Sources
+    path: str = ""
+    part: Any = None
+    record: Any = None
+
+    def __getitem__(self, key: str | int) -> "Place":
+        if isinstance(key, int):
+            return replace(self, path=f"{self.path}[{key}]")
+        if self.path.count(".") > MAX_DEPTH:
+            raise self.error("its values are nested too deeply")
+        return replace(self, path=f"{self.path}.{key}" if self.path else key)
+
+    @property
+    def line(self) -> str:
+        """The text in place of a script line."""
+        return f"{self.sources.file}: {self.path.rpartition('.')[2]}" if self.sources.file else ""
+
+    def error(self, reason: str) -> EntryError:
+        """Return the error for an entry that has a fault."""
+        reason = reason if len(reason) <= MAX_MESSAGE else f"{reason[:MAX_MESSAGE]}..."
+        return EntryError(f"{self.path}: {reason}" if self.path else reason)
+
+    def mismatch(self, expected: str, value: Any) -> EntryError:
+        """Return the error for an unexpected value."""
+        if isinstance(value, Mapping):
+            actual = "named values"
+        elif isinstance(value, list | tuple):
+            actual = f"a list of {len(value)}"
+        elif isinstance(value, str) and len(value) > 40:
+            actual = "a text"
+        elif isinstance(value, int) and abs(value) > MAX_NUMBER:
+            actual = "a huge number"  # Python refuses to print whole numbers of more than 4300 digits
+        else:
+            actual = repr(value)
+        return self.error(f"expected {expected}, got {actual}")
+
+    def converted(self, value: Any, wire: Any) -> Any:
+        """Return the value converted to the type `wire`. Raises EntryError if it has another structure."""
+        try:
+            return msgspec.convert(value, wire)
+        except msgspec.ValidationError as error:
+            reason, _, path = str(error).partition(" - at `$")
+            path = self.path + path.removesuffix("`") if path else self.path
+            raise replace(self, path=path.removeprefix("." * (not self.path))).error(_in_words(reason)) from error
+        except UnicodeEncodeError as error:
+            raise self.error("it has a text with half a character; expected Unicode") from error
+
+    def checked(self, thing: Any) -> Any:
+        """Return a declared thing. Raises EntryError if it has faults."""
+        for fault in thing.faults() if hasattr(thing, "faults") else ():
+            raise self.error(fault)
+        return thing
+
+
+def _in_words(reason: str) -> str:
+    """Return a message of msgspec in the words of this package."""
+    if reason.startswith("Object missing required field"):
+        return "it has no " + reason.rpartition("field ")[2].replace("`", "'")
+    if reason.startswith("Object contains unknown field"):
+        return "unknown name " + reason.partition("field ")[2].replace("`", "'") + "; leave it out"
+
+    def plain(match: re.Match[str]) -> str:
+        names = match[1].split(" | ")
+        return " or ".join(PLAIN_TYPES.get(name, name) for name in names if name != "int" or "float" not in names)
+
+    return re.sub("`([^`]*)`", plain, reason[:1].lower() + reason[1:])
 
 
 class Codec:
@@ -33,7 +153,7 @@ class Codec:
     name = ""
     inner: "tuple[Codec, ...]" = ()
 
-    def encode(self, value: Any, writing: Any) -> Any:
+    def encode(self, value: Any, writing: Writing) -> Any:
         """Return the entry of a value."""
         raise NotImplementedError
 
@@ -43,11 +163,11 @@ class Codec:
 
     def fits(self, entry: Any) -> bool:
         """Return True for an entry that has the outline of this kind."""
-        return True
+        raise NotImplementedError
 
-    def holds(self, value: Any, writing: Any) -> bool:
+    def holds(self, value: Any, writing: Writing) -> bool:
         """Return True for a value that this codec writes."""
-        return True
+        raise NotImplementedError
 
     def definition(self) -> Document:
         """Return the JSON schema of an entry; other schemas refer to it by the name."""
@@ -69,16 +189,13 @@ class Plain(Codec):
     """
 
     def __init__(
-        self,
-        annotation: Any,
-        write: Callable[[Any, Any], Any] = lambda value, writing: value,
+        self, annotation: Any, write: Callable[[Any, Any], Any] = lambda value, writing: value,
         read: Callable[[Any, Place], Any] = lambda value, place: value,
-        when: Callable[[Any], bool] = lambda value: True,
-        are_finite: bool = True,
-    ) -> None:
+        when: Callable[[Any, Any], bool] = lambda value, writing: True, are_finite: bool = True,
+    ) -> None:  # fmt: skip
         self.wire, self.write, self.read, self.when, self.are_finite = _wire(annotation), write, read, when, are_finite
 
-    def encode(self, value: Any, writing: Any) -> Any:
+    def encode(self, value: Any, writing: Writing) -> Any:
         return _without_numpy(self.write(value, writing))
 
     def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
@@ -90,8 +207,8 @@ class Plain(Codec):
     def fits(self, entry: Any) -> bool:
         return not isinstance(entry, dict | list)
 
-    def holds(self, value: Any, writing: Any) -> bool:
-        return self.when(value)
+    def holds(self, value: Any, writing: Writing) -> bool:
+        return self.when(value, writing)
 
 
 def _without_numpy(value: Any) -> Any:
@@ -132,7 +249,7 @@ class Items(Codec):
         self.codec, self.inner = codec, (codec,)
         self.wire = tuple[(codec.wire,) * count] if count else list[codec.wire]  # type: ignore[misc, name-defined]
 
-    def encode(self, value: Any, writing: Any) -> Any:
+    def encode(self, value: Any, writing: Writing) -> Any:
         return [self.codec.encode(item, writing) for item in value]
 
     def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
@@ -142,7 +259,7 @@ class Items(Codec):
     def fits(self, entry: Any) -> bool:
         return isinstance(entry, list)
 
-    def holds(self, value: Any, writing: Any) -> bool:
+    def holds(self, value: Any, writing: Writing) -> bool:
         return isinstance(value, tuple)
 
 
@@ -152,7 +269,7 @@ class Choice(Codec):
     def __init__(self, name: str, expected: str, *codecs: Codec) -> None:
         self.name, self.wire, self.expected, self.inner = name, reference(name), expected, codecs
 
-    def encode(self, value: Any, writing: Any) -> Any:
+    def encode(self, value: Any, writing: Writing) -> Any:
         return next(codec for codec in self.inner if codec.holds(value, writing)).encode(value, writing)
 
     def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
@@ -168,7 +285,7 @@ class Choice(Codec):
 CODECS: dict[Any, Codec] = {}  # of declared classes and unions, for the fields of records; `entries` has all of them
 
 
-def floats(value: Any, writing: Any) -> Any:
+def floats(value: Any, writing: Writing) -> Any:
     """Return a number as a float; also in tuples and mappings. Scripts may have integers, or NumPy numbers."""
     if isinstance(value, Mapping):
         return {key: float(item) for key, item in value.items()}

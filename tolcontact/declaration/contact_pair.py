@@ -1,6 +1,6 @@
 """What parts have in common: contact pairs, forces that press them together, joints of stations, and meant overlaps."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -16,8 +16,7 @@ POINTS = Check(
     f'{COUNT.expected}, or "{VERTICES}"',
     COUNT.wire | text_type([VERTICES]),
 )
-MIN_PARTS = 2
-MIN_MEMBERS = 2
+MIN_PARTS = 2  # of a joint, and of an overlap
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -65,11 +64,11 @@ class ContactPair(Declaration):
             yield "both points and spacing are given; give one of them"
 
     def __str__(self) -> str:
+        points = VERTICES if self.points == VERTICES else f"{self.points} points"
         if self.spacing is not None:
             points = f"spacing {self.spacing:g} mm"
-        else:
-            count = VERTICES if self.points == VERTICES else f"{self.points} points"
-            points = "points by geometry" if self.points is None else count
+        elif self.points is None:
+            points = "points by geometry"
         stiffness = "" if self.stiffness is None else f", {self.stiffness:g} N/mm"
         return f"contact {self.name}: {self.moving} (moving) against {self.reference} (reference), {points}{stiffness}"
 
@@ -134,11 +133,11 @@ class Joint(Declaration):
         return self.members[0]
 
     def faults(self) -> Iterator[str]:
-        if len(self.members) < MIN_MEMBERS:
-            yield f"it has {len(self.members)} part; join at least {MIN_MEMBERS}"
+        if len(self.members) < MIN_PARTS:
+            yield f"it has {len(self.members)} part; join at least {MIN_PARTS}"
         for part in dict.fromkeys(self.members):
-            if self.members.count(part) > 1:
-                yield f'station "{self.station}" joins part "{part.name}" {self.members.count(part)} times in it; name it once'
+            if (count := self.members.count(part)) > 1:
+                yield f'station "{self.station}" joins part "{part.name}" {count} times in it; name it once'
             if part.fixed:
                 yield f'part "{part.name}" is fixed, so no later station can move it; locate it in station "{self.station}"'
         yield from super().faults()
@@ -158,11 +157,6 @@ class Joint(Declaration):
         return f"joint {self.name}: {', '.join(part.name for part in self.members)}, joined in station {self.station}"
 
 
-def parts_of(bodies: Sequence[Part | Joint]) -> tuple[Part, ...]:
-    """Return the parts of bodies, in their order."""
-    return tuple(part for body in bodies for part in (body.members if isinstance(body, Joint) else (body,)))
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Overlap(Declaration):
     """Parts that may overlap, any two of them: press fits, welds, parts that are modelled overlapping.
@@ -179,8 +173,7 @@ class Overlap(Declaration):
         return ", ".join(part.name for part in self.parts)
 
     def faults(self) -> Iterator[str]:
-        count = len(set(self.parts))
-        if count < MIN_PARTS:
+        if (count := len(set(self.parts))) < MIN_PARTS:
             yield f"it names {count} part; name at least {MIN_PARTS}, as in may_overlap(shaft, hub)"
 
     def __str__(self) -> str:

@@ -3,9 +3,9 @@
 Contributors are named by labels: "part.locator", "part.feature.freedom" ("cover.H1.size"), or the name of a variable.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -150,14 +150,3 @@ class Correlation(Declaration):
         numbers = [f"{self.matrix[row][column]:g}" for row in range(len(self.matrix)) for column in range(row)]
         listed = ", ".join(numbers) if len(numbers) <= MAX_LISTED else f"{len(numbers)} coefficients"
         return f"correlation of {self.name}: {listed} ({self.kind})"
-
-
-def correlation(labels: Sequence[str], matrix: Any, declared_at: str, kind: Any = "copula") -> Correlation:
-    """Return the Correlation of contributors; `matrix` may be an array, or one coefficient for two of them."""
-    if is_length(matrix):
-        matrix = [[1.0, matrix], [matrix, 1.0]]
-    try:
-        rows = tuple(tuple(float(number) for number in row) for row in matrix)
-    except (TypeError, ValueError):
-        rows = ()
-    return Correlation(tuple(labels), rows, declared_at, kind)

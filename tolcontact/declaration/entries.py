@@ -1,35 +1,169 @@
-"""Entries of parts, features, tolerances, locations, contact pairs, measures and causes in a document.
+"""Entries of shapes, faces, features, tolerances, measurements and locators in a document: what classes do not determine.
 
 An archive differs from a JSON model in three ways: its faces are triangles, its meshes are next to the document, and it states
 all defaults.
 """
 
+import math
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from msgspec import Meta
 
 from tolcontact.declaration.checks import NOT_NEGATIVE, POSITIVE, text_type
-from tolcontact.declaration.codec import CODECS, Choice, Document, Items, Plain, floats
-from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
-from tolcontact.declaration.dependence import Correlation, Variable
-from tolcontact.declaration.elastic import Elastic
-from tolcontact.declaration.face_entries import FREE_DIRECTION, MEASURED, UNIT_VECTOR, Writing, feature_named
+from tolcontact.declaration.codec import CODECS, Choice, Document, Items, Place, Plain, Writing, floats
 from tolcontact.declaration.feature_tolerance import KINDS, GeometricTolerance
-from tolcontact.declaration.geometry import Box, Mesh, Pin
-from tolcontact.declaration.locator import USUAL_STIFFNESS, Location, Locator, ThreeTwoOne
-from tolcontact.declaration.measure import Measure, tape_of
-from tolcontact.declaration.part import DatumTargets, Face, Feature, Part, Pattern
-from tolcontact.declaration.place import Place
-from tolcontact.declaration.population import Population
+from tolcontact.declaration.geometry import Box, Elastic, Mesh, Pin
+from tolcontact.declaration.locator import USUAL_STIFFNESS, Locator, ThreeTwoOne
+from tolcontact.declaration.measurement import MEASUREMENTS, Chain, Combination, Measurement
+from tolcontact.declaration.part import DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.record import Field, Record
-from tolcontact.declaration.sequence import Station
+from tolcontact.declaration.selection import FACE_GROUPS, Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Form, Size
-from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
-from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTIONS, SEARCHES, Method
+from tolcontact.declaration.values import DIRECTIONS, Vector, direction
+
+UNIT_TOLERANCE = 1e-12  # of the length of a direction
+MAX_INDEX = 2**31 - 1  # of triangles, points, faces
+INDEX = Annotated[int, Meta(extra_json_schema={"minimum": 0, "maximum": MAX_INDEX})]
+FILE_PATH = Annotated[str, Meta(description="path, from the folder of this file")]
+
+
+def _part(name: str, place: Place) -> Part:
+    """Return the part that an entry names."""
+    if name not in place.sources.parts:
+        raise place.mismatch("the name of a part", name)
+    return place.sources.parts[name]  # type: ignore[no-any-return]
+
+
+def feature_named(name: str, place: Place) -> Feature:
+    """Return the feature that an entry names, of the part that its record names."""
+    features = {feature.name: feature for feature in place.part.features}
+    if name not in features:
+        raise place.mismatch(f'the name of a feature of part "{place.part.name}"', name)
+    return features[name]
+
+
+def _array(rows: list[list[float]], place: Place) -> np.ndarray:
+    """Return rows of equal length as an array (row, column)."""
+    for k, row in enumerate(rows):
+        if len(row) != len(rows[0]):
+            raise place[k].mismatch(f"a list of {len(rows[0])}", row)
+    return np.array(rows, dtype=float).reshape(len(rows), len(rows[0]) if rows else 0)
+
+
+def _unit_vector(value: Any, place: Place) -> Vector:
+    is_unit = not isinstance(value, str) and abs(math.hypot(*value) - 1) <= UNIT_TOLERANCE
+    return value if is_unit else direction(value)
+
+
+def _indices(value: Any, place: Place) -> Any:
+    """Return indices, or an entry in their place. Raises EntryError for an index out of range."""
+    for k, index in enumerate(value) if isinstance(value, tuple) else [(None, value)]:
+        if isinstance(index, int) and not 0 <= index <= MAX_INDEX:
+            raise (place if k is None else place[k]).mismatch(f"a whole number from 0 to {MAX_INDEX}", index)
+    return value
+
+
+CODECS |= {
+    Part: Plain(str, lambda part, writing: part.name, _part),
+    Feature: Plain(str, lambda feature, writing: feature.name, feature_named),
+    np.ndarray: Plain(list[list[float]], lambda array, writing: array.tolist(), _array),
+}
+UNIT_VECTOR = Plain(text_type([*DIRECTIONS, "x", "y", "z"]) | Vector, read=_unit_vector)
+FREE_DIRECTION = Plain(text_type([*DIRECTIONS, "x", "y", "z"]) | Vector, lambda value, writing: direction(value))
+
+
+def _brep_faces(value: Any, place: Place) -> Any:
+    """Return the numbers, names or points of one B-rep face, or of several."""
+    if isinstance(value, dict):
+        if list(value) != ["any"]:
+            raise place.mismatch('faces under the key "any"', list(value))
+        return tuple(_brep_faces(face, place["any"][k])[0] for k, face in enumerate(value["any"]))
+    return (value if isinstance(value, tuple) else _indices(value, place),)
+
+
+def _is_axis(criterion: Any, writing: Any = None) -> bool:
+    """Return True for a criterion that is one of six directions, without its own angle."""
+    is_text = isinstance(criterion, Facing) and isinstance(criterion.direction, str)
+    return is_text and criterion == Facing(criterion.direction)
+
+
+AXIS = Plain(
+    text_type(DIRECTIONS), lambda face, writing: face.direction, lambda text, place: place.checked(Facing(text)), _is_axis
+)
+TRIANGLES = Plain(tuple[INDEX, ...], lambda indices, writing: list(map(int, indices)), _indices)
+BREP_FACES = Plain(
+    INDEX | str | Vector | dict[str, list[INDEX | str | Vector]],  # type: ignore[misc]
+    lambda faces, writing: faces[0] if len(faces) == 1 else {"any": faces},
+    _brep_faces,
+)
+CRITERION = Choice(
+    "Criterion",
+    "a direction, or one of facing, inside, near, brep, cylinder, largest, triangles",
+    AXIS,
+    Record(Facing, mark="facing", direction=FREE_DIRECTION, angle=Plain(POSITIVE)),
+    Record(Inside, mark="inside", marked=2),
+    Record(Near, mark="near", part=CODECS[Part]),
+    Record(
+        Brep, mark="brep", omitted="whole", which=BREP_FACES, whole=Plain(bool | text_type(FACE_GROUPS)),
+        build=lambda which, whole=False: Brep(*which, whole=whole),
+    ),
+    Record(Cylinder, mark="cylinder", fields="cylinder", name="CylinderCriterion", cylinder=Field(
+        {"cylinder": Record(Cylinder, omitted="radius inner")}, lambda cylinder, writing: {"cylinder": cylinder},
+        lambda values, place: values, is_required=True,
+    ), build=lambda cylinder: cylinder),
+    Record(Largest, mark="largest", omitted="direction", direction=FREE_DIRECTION),
+    Record(Triangles, mark="triangles", indices=TRIANGLES),
+)  # fmt: skip
+
+
+def _criteria(face: Face, writing: Writing) -> Document:
+    """Return the criteria of a face in a JSON model; in an archive a direction or triangles, and boxes."""
+    boxes = [criterion for criterion in face.selections if isinstance(criterion, Inside)]
+    others = [criterion for criterion in face.selections if not isinstance(criterion, Inside)]
+    if writing.folder is None:
+        is_axis = len(others) == 1 and _is_axis(others[0])
+        criteria = {"direction": others[0]} if is_axis else {"triangles": writing.triangles(face)}
+        return {**criteria, "inside": tuple((box.lower, box.upper) for box in boxes)}
+    return {
+        "select": [
+            Triangles(tuple(map(int, writing.triangles(Face(face.part, (criterion,)))))) if isinstance(criterion, Picked)
+            else criterion
+            for criterion in face.selections
+        ]
+    }  # fmt: skip
+
+
+def _selections(values: Document, place: Place) -> Document:
+    triangles = [Triangles(values["triangles"])] if "triangles" in values else []
+    directions = [values["direction"]] if "direction" in values else []
+    boxes = [Inside(*box) for box in values.get("inside", ())]
+    return {"selections": (*values.get("select", ()), *directions, *triangles, *boxes)}
+
+
+CODECS[Face] = Record(Face, part=CODECS[Part], selections=Field({
+    "select": Items(CRITERION), "direction": AXIS, "triangles": TRIANGLES, "inside": Plain(tuple[tuple[Vector, Vector], ...]),
+}, _criteria, _selections))  # fmt: skip
+CODECS[Point] = Record(Point, mark="part", fields="part on end position", omitted="on end position")
+
+
+def _measurement(cls: Any) -> Record:
+    """Return the record of a kind of measurement: its faces and points, and its directions if it has any."""
+    if issubclass(cls, Combination):
+        return Record(cls, kind=cls.kind, fields="measurements", build=lambda measurements: cls(*measurements))
+    if cls is Chain:
+        return Record(cls, kind=cls.kind, omitted="nominal units", floats="sensitivities nominal")
+    return Record(cls, kind=cls.kind, omitted="across along about", across=UNIT_VECTOR, along=UNIT_VECTOR, about=UNIT_VECTOR)
+
+
+KIND = f"a measurement whose kind is one of {', '.join(MEASUREMENTS)}"
+MEASUREMENT_RECORDS = tuple(map(_measurement, MEASUREMENTS.values()))
+CODECS[str | Measurement] = Choice("Operand", f"the name of a measurement, or {KIND}", *MEASUREMENT_RECORDS, Plain(str))
+MEASURED = Choice("Measured", f"a point, or {KIND}", *MEASUREMENT_RECORDS, CODECS[Point])
 
 
 def _distribution_values(thing: Any, writing: Writing) -> Document:
@@ -60,7 +194,6 @@ DISTRIBUTION = Field({
     "distribution": Plain(text_type(SHAPES)), "scipy": Plain(str), "args": Plain(tuple[float, ...], floats),
     "kwds": Plain(Mapping[str, float], floats),
 }, _distribution_values, _distribution)  # fmt: skip
-WIDTH = Plain(NOT_NEGATIVE | str, read=lambda width, place: place.checked(Tolerance(width)))
 CODECS[Tolerance] = Choice(
     "Tolerance",
     "a width in mm, a text such as '±0.1', or named values",
@@ -68,7 +201,7 @@ CODECS[Tolerance] = Choice(
         Tolerance, name="Zone", omitted="range shift cp cpk side parts", floats="shift cpk", range=Plain(NOT_NEGATIVE | str),
         distribution=DISTRIBUTION, cp=Plain(POSITIVE, floats),
     ),
-    WIDTH,
+    Plain(NOT_NEGATIVE | str, read=lambda width, place: place.checked(Tolerance(width))),
 )  # fmt: skip
 CODECS[Form] = Record(Form, omitted="covariance length modes lobes measured")
 TOLERANCE_FIELDS = [member.name for member in fields(GeometricTolerance) if member.name != "of"]
@@ -99,15 +232,8 @@ TOLERANCED = Choice(
 )
 
 
-class ArchivedMesh(Record):
-    """Meshes of an archive, which has them next to the document, by the names of parts."""
-
-    def holds(self, value: Any, writing: Any) -> bool:
-        return writing.folder is None and super().holds(value, writing)
-
-
 def _mesh_source(values: Document, place: Place) -> Document:
-    """Return the mesh that an archive has next to the document."""
+    """Return the mesh that an archive has next to the document, by the name of its part."""
     if place.record.name not in place.sources.meshes:
         raise place["mesh"].error("expected that of a part with a mesh, or with a box")
     return {"source": place.sources.meshes[place.record.name]}
@@ -124,35 +250,35 @@ def _file(name: str, place: Place) -> Path:
     return place.sources.folder / name
 
 
-FILE_PATH = Annotated[str, Meta(description="path, from the folder of this file")]
 SHAPE = Choice(
     "Shape",
     "a box, a pin, or a file",
     Record(Box, mark="box", marked=3),
     Record(Pin, mark="pin", marked=2, omitted="head"),
-    ArchivedMesh(Mesh, mark="mesh", name="ArchivedMesh", fields="source", source=Field(
-        {"mesh": Plain(str)}, lambda mesh, writing: {"mesh": str(mesh)}, _mesh_source, is_required=True
-    )),
     Record(
-        Mesh, mark="file", omitted="units body chord",
-        source=Plain(FILE_PATH, _file_name, _file),
+        Mesh, mark="mesh", name="ArchivedMesh", fields="source", when=lambda mesh, writing: writing.folder is None,
+        source=Field({"mesh": Plain(str)}, lambda mesh, writing: {"mesh": str(mesh)}, _mesh_source, is_required=True),
     ),
+    Record(Mesh, mark="file", omitted="units body chord", source=Plain(FILE_PATH, _file_name, _file)),
 )  # fmt: skip
-
-
-def _ground_values(location: Location, writing: Writing) -> Document:
-    feature = {"on_feature": location.on.name} if isinstance(location.on, Feature) else {}
-    return {"on": location.parent, **feature}
-
-
-def _ground(values: Document, place: Place) -> Document:
-    """Return the part that locators are on, or the feature of it; None for the ground."""
-    part = values.get("on")
-    if "on_feature" not in values:
-        return {"on": part}
-    if part is None:
-        raise place["on_feature"].error('it goes with "on", the part of the feature; give both')
-    return {"on": feature_named(values["on_feature"], replace(place["on_feature"], part=part))}
+MATRIX_FILE = Plain(  # archives have the path as it was stated
+    FILE_PATH,
+    lambda source, writing: str(source) if writing.folder is None else _file_name(source, writing),
+    lambda name, place: Path(name) if place.sources.folder is None else _file(name, place),
+)
+ELASTIC = Record(
+    Elastic, omitted="E nu density stiffness nodes pad element_size", floats="E nu density pad element_size",
+    stiffness=MATRIX_FILE, nodes=MATRIX_FILE,
+)  # fmt: skip
+# Their faces may refer to all parts: a document is read for them once it has all parts.
+OF_PART = Field(
+    {"features": Items(TOLERANCED), "datum_targets": Items(TARGETS), "elastic": Items(ELASTIC)},
+    lambda part, writing: {
+        "features": part.toleranced,
+        **({"datum_targets": part.targets} if part.targets else {}),
+        **({"elastic": [part.elasticity]} if part.elasticity else {}),
+    },
+)
 
 
 def _stiffness_values(locator: Locator, writing: Writing) -> Document:
@@ -179,81 +305,3 @@ SCHEME = Choice(
     Items(LOCATOR),
     Record(ThreeTwoOne, mark="three_two_one", marked=3, floats="inset"),
 )
-STEPS = Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]
-
-
-def _measured_values(measure: Measure, writing: Writing) -> Document:
-    return {"tape": writing.tapes[measure.name]} if measure.is_expression else {"of": measure.of}
-
-
-def _measured(values: Document, place: Place) -> Document:
-    if len(values) != 1:
-        what = " and ".join(values) or "neither"
-        raise place.error(
-            f'it has {what}; expected either "of", a point or a measurement, or "tape", the steps of an expression'
-        )
-    return {"of": next(iter(values.values()))}
-
-
-METHOD = Record(Method, **{  # type: ignore[arg-type]
-    name: Plain(text_type(choices)) for name, choices in {
-        "resolution": RESOLUTIONS, "objective": OBJECTIVES, "regularization": REGULARIZATIONS, "active_set": ACTIVE_SETS,
-        "search": SEARCHES,
-    }.items()
-})  # fmt: skip
-TITLE_BLOCK = Record(TitleBlock, omitted=" ".join(TitleBlock().entries))
-
-
-MATRIX_FILE = Plain(  # archives have the path as it was stated
-    FILE_PATH,
-    lambda source, writing: str(source) if writing.folder is None else _file_name(source, writing),
-    lambda name, place: Path(name) if place.sources.folder is None else _file(name, place),
-)
-ELASTIC = Record(
-    Elastic, omitted="E nu density stiffness nodes pad element_size", floats="E nu density pad element_size",
-    stiffness=MATRIX_FILE, nodes=MATRIX_FILE,
-)  # fmt: skip
-
-
-class OfPart(Items):
-    """Features and datum targets, whose faces may refer to all parts: a document is read for them once it has all parts."""
-
-    def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
-        return entry
-
-
-FEATURES = Field(
-    {"features": OfPart(TOLERANCED), "datum_targets": OfPart(TARGETS), "elastic": OfPart(ELASTIC)},
-    lambda part, writing: {
-        "features": part.toleranced,
-        **({"datum_targets": part.targets} if part.targets else {}),
-        **({"elastic": [part.elasticity]} if part.elasticity else {}),
-    },
-    lambda values, place: {},
-)
-RECORDS = {
-    "parts": Record(
-        Part, fields="geometry name at rotation fixed standard mirror declared_at features", omitted="standard mirror",
-        geometry=SHAPE, features=FEATURES,
-    ),
-    "locations": Record(
-        Location, omitted="floating station joint placing", scheme=SCHEME,
-        on=Field({"on": CODECS[Part], "on_feature": Plain(str)}, _ground_values, _ground, is_nullable=True),
-    ),
-    "pairs": Record(ContactPair, omitted="mu station stiffness", floats="mu stiffness"),
-    "measures": Record(
-        Measure, omitted="to absolute limits station", floats="limits", along=UNIT_VECTOR,
-        of=Field({"of": MEASURED, "tape": Plain(STEPS, read=tape_of, are_finite=False)}, _measured_values, _measured),
-        tolerance=Plain(POSITIVE | tuple[float, float] | str),
-    ),
-    "forces": Record(Force, omitted="station"),
-    "variables": Record(Variable, floats="drives nominal expands loads", omitted="nominal expands loads"),
-    "correlations": Record(Correlation, omitted="kind"),
-    "populations": Record(
-        Population, fields="values columns source declared_at gauge lots left_out", floats="gauge",
-        omitted="gauge lots left_out",
-    ),
-    "stations": Record(Station),
-    "joints": Record(Joint, omitted="at pad"),
-    "overlaps": Record(Overlap),
-}  # fmt: skip

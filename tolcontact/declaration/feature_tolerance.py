@@ -159,8 +159,7 @@ class GeometricTolerance(Checked):
     @property
     def system(self) -> tuple[tuple[str, ...], ...]:
         """The letters of the datum system: one for each compartment, or several for a common datum."""
-        matches = [COMPARTMENT.fullmatch(compartment) for compartment in self._compartments]
-        return tuple(tuple(match.group(1).split("-")) for match in matches if match)
+        return tuple(tuple(match[1].split("-")) for match in map(COMPARTMENT.fullmatch, self._compartments) if match)
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -179,19 +178,13 @@ class GeometricTolerance(Checked):
 
     @property
     def _compartments(self) -> list[str]:
-        if not (self.datums and isinstance(self.datums, str)):
-            return []
-        return [compartment.strip() for compartment in self.datums.split("|")]
+        has_datums = self.datums and isinstance(self.datums, str)
+        return [compartment.strip() for compartment in self.datums.split("|")] if has_datums else []
 
     @property
     def across(self) -> Vector | None:
         """The unit vector across a flat zone."""
         return None if self.along is None else _direction(self.along)
-
-    @property
-    def _unit_lengths(self) -> tuple[float, ...]:
-        """The lengths [mm] of the parts of a surface that it applies to; none for the surface as a whole."""
-        return () if self.per is None else _lengths(self.per)
 
     @property
     def limits_form_alone(self) -> bool:
@@ -210,14 +203,15 @@ class GeometricTolerance(Checked):
         yield from self._datum_faults()
         yield from self._zone_faults()
         yield from super().faults()
-        yield from self._process_faults()
+        if not (is_length(self.cp) and self.cp > 0):
+            yield f"cp is {self.cp!r}; expected a number above 0"
+        elif self.cpk is not None and not (is_length(self.cpk) and self.cpk <= self.cp):
+            yield f"cpk is {self.cpk!r}; expected a number, at most cp"
+        yield from side_faults(self.side, self.cpk)
 
     def _datum_faults(self) -> Iterator[str]:
-        if (
-            not isinstance(self.datums, str)
-            or not all(map(COMPARTMENT.fullmatch, self._compartments))
-            or len(self._compartments) > 3
-        ):
+        are_valid = isinstance(self.datums, str) and all(map(COMPARTMENT.fullmatch, self._compartments))
+        if not are_valid or len(self._compartments) > 3:
             yield f'datums is {self.datums!r}; expected up to three datums, such as "A|B|C", "A|B(M)", "A-B" or "A><"'
             return
         if len(set(self.letters)) < len(self.letters):
@@ -250,17 +244,10 @@ class GeometricTolerance(Checked):
         if self.is_form and self.form is not None and self.rule != INSIDE:
             yield f'the rule is "{self.rule}"; form is drawn by the rule "{INSIDE}" alone'
 
-    def _process_faults(self) -> Iterator[str]:
-        if not (is_length(self.cp) and self.cp > 0):
-            yield f"cp is {self.cp!r}; expected a number above 0"
-        elif self.cpk is not None and not (is_length(self.cpk) and self.cpk <= self.cp):
-            yield f"cpk is {self.cpk!r}; expected a number, at most cp"
-        yield from side_faults(self.side, self.cpk)
-
     def __str__(self) -> str:
         """Return the tolerance with the symbols of a drawing."""
         diameter, material = "⌀" if self.zone == "round" else "", f" {SYMBOLS[self.material]}" if self.material else ""
-        unit = f"/{'×'.join(f'{length:g}' for length in self._unit_lengths)}" if self._unit_lengths else ""
+        unit = "" if self.per is None else f"/{'×'.join(f'{length:g}' for length in _lengths(self.per))}"
         projected = "" if self.projected is None else f" Ⓟ{self.projected:g}"
         unequal = "" if self.outside is None else f" Ⓤ{self.outside:g}"
         tangent = " Ⓣ" if self.tangent else ""
@@ -272,7 +259,7 @@ class GeometricTolerance(Checked):
     def archived_text(self) -> str:
         """The tolerance without symbols, as archives describe the contributors of a feature."""
         round_ = "diameter " if self.zone == "round" else ""
-        unit = f" per {' x '.join(f'{length:g}' for length in self._unit_lengths)} mm" if self._unit_lengths else ""
+        unit = "" if self.per is None else f" per {' x '.join(f'{length:g}' for length in _lengths(self.per))} mm"
         tangent, datums = " of the tangent plane" if self.tangent else "", f" to {self.datums}" if self.datums else ""
         uneven = "" if self.outside is None else f", {self.outside:g} mm of it outside,"
         return f"{self.kind} {round_}{self.width:g}{self.material} mm{unit}{uneven}{tangent}{self._zones}{datums}"
@@ -288,9 +275,7 @@ Position = ToleranceKind(
     (*AXIS_OPTIONS, "projected"),
 )  # fmt: skip
 Coaxiality = ToleranceKind(
-    "coaxiality",
-    "coaxiality of an axis with the axis of its datums: a round zone (ISO 1101, 17.13)",
-    ("material", "combined"),
+    "coaxiality", "coaxiality of an axis with the axis of its datums: a round zone (ISO 1101, 17.13)", ("material", "combined")
 )
 Symmetry = ToleranceKind(
     "symmetry", "symmetry of the middle of two opposed planes, or of an axis between planes, to its datums (ISO 1101, 17.14)",
@@ -301,12 +286,9 @@ Profile = ToleranceKind(
     ("outside", "tangent", "combined"), needs_datums=False, limits_wall=True,
 )  # fmt: skip
 LineProfile = ToleranceKind(  # the zones of all lines are taken as one zone of the surface
-    "line profile",
-    "profile of any line of a surface (ISO 1101, 17.7)",
-    ("outside", "combined"),
-    needs_datums=False,
+    "line profile", "profile of any line of a surface (ISO 1101, 17.7)", ("outside", "combined"), needs_datums=False,
     limits_wall=True,
-)
+)  # fmt: skip
 Parallelism = ToleranceKind("parallelism", "parallelism of a plane or an axis to its datums (ISO 1101, 17.9)", AXIS_OPTIONS)
 Perpendicularity = ToleranceKind(
     "perpendicularity", "perpendicularity of a plane or an axis to its datums (ISO 1101, 17.10)", (*AXIS_OPTIONS, "projected")
@@ -315,11 +297,9 @@ Angularity = ToleranceKind(
     "angularity", "angularity of a plane or an axis: its angle to its datums (ISO 1101, 17.11)", AXIS_OPTIONS
 )
 CircularRunout = ToleranceKind(  # without form deviations it equals total run-out
-    "circular run-out",
-    "run-out of each section of a cylinder, or of each circle of a plane, to the axis of its datums (ISO 1101, 17.15)",
-    limits_wall=True,
-    has_any_size=True,
-)
+    "circular run-out", "run-out of each section of a cylinder, or of each circle of a plane, to the axis of its datums "
+    "(ISO 1101, 17.15)", limits_wall=True, has_any_size=True,
+)  # fmt: skip
 TotalRunout = ToleranceKind(
     "total run-out", "run-out of a cylinder or a plane to the axis of its datums (ISO 1101, 17.16)", limits_wall=True,
     has_any_size=True,

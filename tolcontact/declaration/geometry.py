@@ -1,11 +1,12 @@
-"""Shapes of parts, in the part's own frame."""
+"""Shapes of parts, in the part's own frame, and their elasticity."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of
+from tolcontact.declaration.checks import LENGTH, POSITIVE, TRUTH, Check, Checked, one_of
 from tolcontact.input_files import fault_of
 from tolcontact.texts import shown
 
@@ -93,3 +94,68 @@ class Mesh(Checked):
 
 
 Geometry = Box | Mesh | Pin
+MIN_POISSON, MAX_POISSON = -1.0, 0.5
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+MODULUS = Check(lambda value: _is_number(value) and value > 0, "a modulus in MPa above 0, such as 70e3", POSITIVE)
+POISSON = Check(
+    lambda value: _is_number(value) and MIN_POISSON < value < MAX_POISSON, "a Poisson's ratio between -1 and 0.5", float
+)
+DENSITY = Check(lambda value: _is_number(value) and value > 0, "a density in kg/m^3 above 0, such as 2700", POSITIVE)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Elastic(Checked):
+    """The elasticity of a part, linear about its stress-free shape: from its own mesh, or from a stiffness matrix.
+
+    E          Young's modulus [MPa] of an isotropic material
+    nu         its Poisson's ratio
+    density    [kg/m^3], which `assembly.gravity` needs
+    stiffness  file with the stiffness matrix [N/mm] of a finite-element program, without supports, in place of E and nu
+    nodes      file with the nodes [mm] of that matrix, in the frame of the part
+    pad        [mm] radius over which a force at a point is spread; by default the body's
+    element_size  [mm] longest edge of the tetrahedra of a part that is meshed here; by default by its thickness
+    """
+
+    E: float | None = None
+    nu: float | None = None
+    density: float | None = None
+    stiffness: str | Path | None = None
+    nodes: str | Path | None = None
+    pad: float | None = None
+    element_size: float | None = None
+    declared_at: str = ""
+    fault_prefix = "elastic "
+    checks: ClassVar = {"E": MODULUS, "nu": POISSON, "density": DENSITY, "pad": LENGTH, "element_size": LENGTH}
+
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
+        has_material, has_matrix = self.E is not None or self.nu is not None, self.stiffness is not None
+        if has_material and has_matrix:
+            yield "elastic has E or nu and a stiffness; give the material, or the files of a matrix"
+        elif has_matrix and self.nodes is None:
+            yield 'elastic has a stiffness without nodes; give the file with the nodes of the matrix, as in nodes="nodes.csv"'
+        elif has_matrix and self.element_size is not None:
+            yield "elastic has an element_size and a stiffness; a matrix has the mesh of its program, so leave element_size out"
+        elif not has_matrix and (self.E is None or self.nu is None):
+            yield "elastic needs E and nu, as in elastic(E=70e3, nu=0.33), or stiffness and nodes"
+
+    def __str__(self) -> str:
+        if self.stiffness is not None:
+            return f"elastic, by {Path(self.stiffness).name}"
+        size = "" if self.element_size is None else f", elements of {self.element_size:g} mm"
+        return f"elastic, E {self.E:g} MPa, nu {self.nu:g}{size}"
+
+
+def elastic_faults(elastics: Sequence[Elastic], fixed: bool | None) -> Iterator[str]:
+    """Yield the faults of what is declared of a part's elasticity."""
+    for elastic in elastics:
+        yield from elastic.faults()
+    if len(elastics) > 1:
+        yield f"it is declared elastic {len(elastics)} times; declare it once"
+    if elastics and fixed:
+        yield "it is elastic and fixed=True; leave fixed out, and hold it by its locators"

@@ -49,17 +49,9 @@ class Locator(Checked):
     checks: ClassVar = {"stiffness": STIFFNESS, "one_sided": TRUTH}
 
     def __init__(
-        self,
-        name: str,
-        point: Point | Sequence[float] | np.ndarray,
-        direction: Direction,
-        tolerance: Any = None,
-        *,
-        one_sided: bool = False,
-        stiffness: float | None = None,
-        on: Feature | None = None,
-        part: Part | None = None,
-    ) -> None:
+        self, name: str, point: Point | Sequence[float] | np.ndarray, direction: Direction, tolerance: Any = None, *,
+        one_sided: bool = False, stiffness: float | None = None, on: Feature | None = None, part: Part | None = None,
+    ) -> None:  # fmt: skip
         place: Any = point
         if isinstance(point, Point):
             part, on, place = point.part, on or point.on, point.position
@@ -192,7 +184,7 @@ class Location(Declaration):
         return tuple(part for face in self.faces for part in face.parts)
 
     def faults(self) -> Iterator[str]:
-        yield from self._faces_faults() if isinstance(self.scheme, ThreeTwoOne) else self._locator_faults(self.scheme)
+        yield from self._faces_faults(self.scheme) if isinstance(self.scheme, ThreeTwoOne) else self._locator_faults()
         yield from super().faults()
         if self.placing in PLACINGS[1:] and (self.floating or self.has_supports):
             yield f'placing="{self.placing}" needs locators that hold both ways; leave floating and one_sided out'
@@ -201,8 +193,8 @@ class Location(Declaration):
         if isinstance(self.on, Feature) and self.on not in self.on.part.features:
             yield f'it is on feature "{self.on.name}", which is no feature of part "{self.on.part.name}"; take one of that part'
 
-    def _faces_faults(self) -> Iterator[str]:
-        yield from self.scheme.faults() if isinstance(self.scheme, ThreeTwoOne) else ()
+    def _faces_faults(self, scheme: ThreeTwoOne) -> Iterator[str]:
+        yield from scheme.faults()
         for face in self.faces:
             if face.part is not self.part and not self.joint:
                 yield f'face {face} belongs to part "{face.part.name}", not to part "{self.part.name}"'
@@ -211,8 +203,8 @@ class Location(Declaration):
         if self.tolerance is None:
             yield "its 3-2-1 scheme has no tolerance; give one to the locate call"
 
-    def _locator_faults(self, scheme: tuple[Locator, ...]) -> Iterator[str]:
-        names = [locator.name for locator in scheme]
+    def _locator_faults(self) -> Iterator[str]:
+        scheme, names = self.locators, [locator.name for locator in self.locators]
         for locator in scheme:
             part = locator.part or self.part
             if self.joint and locator.part is None:
@@ -246,14 +238,13 @@ class Location(Declaration):
 
     @property
     def has_supports(self) -> bool:
-        return isinstance(self.scheme, tuple) and any(locator.one_sided for locator in self.scheme)
+        return any(locator.one_sided for locator in self.locators)
 
     def __str__(self) -> str:
         scheme = self.scheme if isinstance(self.scheme, ThreeTwoOne) else f"{len(self.scheme)} locators"
         feature = f"{self.on.name} of " if isinstance(self.on, Feature) else ""
         ground = f"{feature}{self.parent.name}" if self.parent else "the ground"
-        floating = ", floating" if self.floating else ""
-        floating += f", {self.placing}" if self.placing != FIRST_ORDER else ""
+        floating = (", floating" if self.floating else "") + (f", {self.placing}" if self.placing != FIRST_ORDER else "")
         return f"location of {self.name} on {ground}: {scheme}{floating}" + (f"; {self.tolerance}" if self.tolerance else "")
 
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from tolcontact.declaration.checks import TRUTH, Declaration, direction_faults
+from tolcontact.declaration.codec import Place
 from tolcontact.declaration.geometry import UNITS
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Part, Point
-from tolcontact.declaration.place import Place
 from tolcontact.declaration.values import Vector, is_length, is_line
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 from tolcontact.tables import MAX_NUMBER
@@ -156,13 +156,11 @@ class Measure(Declaration):
         if self.tolerance is not None:
             yield "it has both a tolerance and limits; give one of them"
         fault = f"limits are {self.limits!r}; expected (lower, upper), numbers with lower < upper, or None for an open side"
-        if not (isinstance(self.limits, tuple) and len(self.limits) == 2):
-            is_text = isinstance(self.limits, str)
-            yield (
-                f"{fault}; around the nominal value they are a tolerance, as in tolerance={self.limits!r}" if is_text else fault
-            )
+        if isinstance(self.limits, str):
+            yield f"{fault}; around the nominal value they are a tolerance, as in tolerance={self.limits!r}"
             return
-        limits = [limit for limit in self.limits if limit is not None]
+        is_pair = isinstance(self.limits, tuple) and len(self.limits) == 2
+        limits = [limit for limit in self.limits if limit is not None] if is_pair else []
         if not limits or not all(map(is_length, limits)) or (len(limits) == 2 and not limits[0] < limits[1]):
             yield fault
 
@@ -182,10 +180,9 @@ class Measure(Declaration):
 
     def __str__(self) -> str:
         along = "" if self.along is None else " along ({:g}, {:g}, {:g})".format(*self.along)
+        subject = "expression of the poses" if self.is_expression else f"{self.of}{along}"
         if self.to is not None:
             subject = f"distance {self.of} to {self.to}{along}"
-        else:
-            subject = "expression of the poses" if self.is_expression else f"{self.of}{along}"
         if isinstance(self.of, Point) and self.absolute is not None:
             subject = f"{self.quantity}, {subject}"
         return f"measurement {self.name}: {subject}{self._limit_text}"

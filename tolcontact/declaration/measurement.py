@@ -31,12 +31,12 @@ class Measurement(Readable):
     @property
     def faces(self) -> tuple[Face, ...]:
         """The faces that are measured."""
-        return ()
+        return tuple(value for value in vars(self).values() if isinstance(value, Face))
 
     @property
     def points(self) -> tuple[Point, ...]:
         """The points that are measured."""
-        return ()
+        return tuple(value for value in vars(self).values() if isinstance(value, Point))
 
     @property
     def operands(self) -> "tuple[str | Measurement, ...]":
@@ -68,9 +68,10 @@ class Measurement(Readable):
         for thing in things:
             yield from thing.faults()
 
-    def _take_faces(self, **faces: Any) -> None:
-        """Store faces, or the faces of features. Raises TypeError for anything else."""
-        for name, face in faces.items():
+    def _take_faces(self, *names: str) -> None:
+        """Store faces in place of features. Raises TypeError for anything else."""
+        for name in names:
+            face = getattr(self, name)
             if not isinstance(face, Face | Feature):
                 raise TypeError(f'{self.kind}: {name} is a {type(face).__name__}; expected part.face("+z"), or a feature')
             object.__setattr__(self, name, face_of(face))
@@ -88,15 +89,7 @@ class _OfStation(Measurement):
                 f'tc.{type(self).__name__}(part.point(x, y, z), other.face("+z")); of two faces there are tc.Clearance, '
                 "tc.LargestGap and tc.MeanGap"
             )
-        self._take_faces(face=self.face)
-
-    @property
-    def faces(self) -> tuple[Face, ...]:
-        return (self.face,)
-
-    @property
-    def points(self) -> tuple[Point, ...]:
-        return (self.station,)
+        self._take_faces("face")
 
     def __str__(self) -> str:
         return f"{self.kind} from {self.station} to {self.face}"
@@ -133,14 +126,10 @@ class _OfTwoFaces(Measurement):
     directions: ClassVar[tuple[str, ...]] = ()  # names of fields that may be left out
 
     def __post_init__(self) -> None:
-        self._take_faces(first=self.first, second=self.second)
+        self._take_faces("first", "second")
         for name in self.directions:
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, direction(getattr(self, name)))
-
-    @property
-    def faces(self) -> tuple[Face, ...]:
-        return (self.first, self.second)
 
     def faults(self) -> Iterator[str]:
         yield from super().faults()
@@ -153,7 +142,6 @@ class _OfTwoFaces(Measurement):
         return "".join([f"{self.kind} of {self.first} and {self.second}", *texts])
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Clearance(_OfTwoFaces):
     """The shortest distance of two faces of different parts, negative where they overlap: `tc.Clearance(first, second)`.
 
@@ -282,8 +270,8 @@ class Combination(Measurement):
             if not isinstance(value, str | Measurement):
                 raise TypeError(f"{self.kind}: {type(operand).__name__} is no measurement; expected one, or the name of one")
             operands.append(value)
-        object.__setattr__(self, "measurements", tuple(operands))
-        object.__setattr__(self, "depth", 1 + max((nested.depth for nested in self._nested), default=0))
+        vars(self)["measurements"] = tuple(operands)
+        vars(self)["depth"] = 1 + max((nested.depth for nested in self._nested), default=0)
         if self.depth > MAX_DEPTH:
             raise ValueError(f"{self.kind}: measurements are nested more than {MAX_DEPTH} deep; declare some as measures")
 

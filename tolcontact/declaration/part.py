@@ -3,18 +3,19 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
+from pathlib import Path
 from typing import ClassVar, Literal, TypeVar, get_args
 
-from tolcontact.declaration.checks import Declaration, one_of
-from tolcontact.declaration.elastic import Deformable, Elastic
-from tolcontact.declaration.geometry import Geometry
+from tolcontact.declaration.checks import Checked, Declaration, one_of
+from tolcontact.declaration.geometry import Elastic, Geometry, elastic_faults
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
 from tolcontact.declaration.values import Mirror, Side, Vector, is_finite, script_line, vector
 from tolcontact.readable import Readable
 from tolcontact.user_functions import refuse_in_functions
 
-D = TypeVar("D", bound=Declaration)
+D = TypeVar("D", bound=Checked)
 
 Association = Literal["outside", "least squares"]  # from a plane to a datum, ISO 5459
 OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = get_args(Association)
@@ -22,7 +23,7 @@ Standard = Literal["", "ISO", "ASME"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Part(Deformable):
+class Part(Declaration):
     """A body: its shape, its place in the nominal assembly, and whether contact may move it. It is rigid unless `elastic`.
 
     A point `p` of the part lies at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation vector [rad],
@@ -39,14 +40,14 @@ class Part(Deformable):
     standard: Standard = ""
     declared_at: str = field(default_factory=script_line)
     mirror: Mirror = ""
+    declared: "list[Feature | Pattern | DatumTargets | Elastic]" = field(default_factory=list, init=False)
+    noun: ClassVar[str] = "part"
     checks: ClassVar = {"standard": one_of(get_args(Standard)), "mirror": one_of(get_args(Mirror))}
-    _declared: "list[Feature | Pattern | DatumTargets]" = field(default_factory=list, init=False)
-    _elastics: list[Elastic] = field(default_factory=list, init=False)
 
     @property
     def toleranced(self) -> "tuple[Feature | Pattern, ...]":
         """The features and patterns in the order of the script."""
-        return tuple(declared for declared in self._declared if isinstance(declared, Feature | Pattern))
+        return tuple(declared for declared in self.declared if isinstance(declared, Feature | Pattern))
 
     @property
     def features(self) -> "tuple[Feature, ...]":
@@ -55,35 +56,32 @@ class Part(Deformable):
 
     @property
     def targets(self) -> "tuple[DatumTargets, ...]":
-        return tuple(declared for declared in self._declared if isinstance(declared, DatumTargets))
+        return tuple(declared for declared in self.declared if isinstance(declared, DatumTargets))
+
+    @property
+    def elasticity(self) -> Elastic | None:
+        """Its elasticity; None for a rigid part."""
+        return next((declared for declared in self.declared if isinstance(declared, Elastic)), None)
 
     def feature(
-        self,
-        name: str,
-        *constituents: "Face | Control",
-        datum: str | None = None,
-        association: Association = "outside",
+        self, name: str, *constituents: "Face | Control", datum: str | None = None, association: Association = "outside"
     ) -> "Feature":
         """Name a face, or two that are opposed, with its tolerances: `part.feature("H1", face, tc.Size(8, 0.1), datum="B")`.
 
         The `name` is unique in the part; `constituents` are one face or two, and tolerances. `datum` is a letter.
         `association` is how a plane with tilt or form becomes a datum: "outside" (default) or "least squares".
         """
-        for constituent in constituents:
-            if not isinstance(constituent, Face | Control):
-                raise TypeError(
-                    f'feature "{name}": {type(constituent).__name__} is neither a face nor a tolerance; expected '
-                    "part.face(...), tc.Size(...), tc.Position(...) or another tolerance of a feature"
-                )
         faces = tuple(constituent for constituent in constituents if isinstance(constituent, Face))
-        tolerances = tuple(constituent for constituent in constituents if not isinstance(constituent, Face))
+        tolerances = tuple(constituent for constituent in constituents if isinstance(constituent, Control))
+        if others := [constituent for constituent in constituents if not isinstance(constituent, Face | Control)]:
+            raise TypeError(
+                f'feature "{name}": {type(others[0]).__name__} is neither a face nor a tolerance; expected '
+                "part.face(...), tc.Size(...), tc.Position(...) or another tolerance of a feature"
+            )
         return self.add(Feature(name, self, faces, tolerances, datum, script_line(), association))
 
     def pattern(
-        self,
-        name: str,
-        *constituents: "Face | Sequence[Face] | Feature | Control",
-        datum: str | None = None,
+        self, name: str, *constituents: "Face | Sequence[Face] | Feature | Control", datum: str | None = None
     ) -> "Pattern":
         """Name several like faces with their common tolerances: `part.pattern("H", face, face, tc.Position(0.2, "A"))`.
 
@@ -104,17 +102,30 @@ class Part(Deformable):
         tolerances = tuple(tolerance for tolerance in constituents if isinstance(tolerance, Control))
         return self.add(Pattern(name, self, tuple(members), tolerances, datum, script_line()))
 
+    def elastic(
+        self, E: float | None = None, nu: float | None = None, *, density: float | None = None,
+        stiffness: str | Path | None = None, nodes: str | Path | None = None, pad: float | None = None,
+        element_size: float | None = None,
+    ) -> Elastic:  # fmt: skip
+        """Declare that forces bend this part: `part.elastic(E=70e3, nu=0.33)`, or by the files of a matrix.
+
+        `E`, `nu`, `density`, `stiffness`, `nodes`, `pad` and `element_size` are explained by Elastic.
+        """
+        return self.add(Elastic(
+            E=E, nu=nu, density=density, stiffness=stiffness, nodes=nodes, pad=pad,
+            element_size=element_size, declared_at=script_line(),
+        ))  # fmt: skip
+
     def add(self, declared: D) -> D:
         """Add a declaration of this part, and return it."""
         refuse_in_functions()
-        self._declared.append(declared)  # type: ignore[arg-type]
+        self.declared.append(declared)  # type: ignore[arg-type]
         return declared
 
     def datum_targets(self, letter: str, *points: "Point") -> "DatumTargets":
         """Declare datum `letter` by `points` on features: `part.datum_targets("A", pad.point(0, 0, 0))` (see DatumTargets)."""
-        for point in points:
-            if not isinstance(point, Point):
-                raise TypeError(f'datum "{letter}": {type(point).__name__} is no point; expected feature.point(x, y, z)')
+        if others := [point for point in points if not isinstance(point, Point)]:
+            raise TypeError(f'datum "{letter}": {type(others[0]).__name__} is no point; expected feature.point(x, y, z)')
         return self.add(DatumTargets(letter, points, script_line()))
 
     def point(self, x: float, y: float, z: float) -> "Point":
@@ -133,10 +144,10 @@ class Part(Deformable):
     def faults(self) -> Iterator[str]:
         yield from super().faults()
         yield from self.geometry.faults()
-        for label, value, example in (("at", self.at, "(0, 0, 10)"), ("rotation", self.rotation, "tc.degrees(0, 0, 90)")):
-            if not is_finite(value):
-                yield f"{label} is {value!r}; expected three finite numbers, as in {label}={example}"
-        yield from self.elastic_faults()
+        for label, example in (("at", "(0, 0, 10)"), ("rotation", "tc.degrees(0, 0, 90)")):
+            if not is_finite(getattr(self, label)):
+                yield f"{label} is {getattr(self, label)!r}; expected three finite numbers, as in {label}={example}"
+        yield from elastic_faults([declared for declared in self.declared if isinstance(declared, Elastic)], self.fixed)
 
     def __str__(self) -> str:
         place = "" if self.at == (0.0, 0.0, 0.0) else " at ({:g}, {:g}, {:g})".format(*self.at)
@@ -157,8 +168,8 @@ class Face(Readable):
         return (self.part, *(selection.part for selection in self.selections if isinstance(selection, Near)))
 
     def faults(self) -> Iterator[str]:
-        for selection in self.selections:
-            yield from (f'face of part "{self.part.name}": {fault}' for fault in selection.faults())
+        faults = (fault for selection in self.selections for fault in selection.faults())
+        yield from (f'face of part "{self.part.name}": {fault}' for fault in faults)
 
     def __str__(self) -> str:
         return " ".join([self.part.name, *map(str, self.selections)])
@@ -207,7 +218,6 @@ class Feature(Toleranced):
     datum: str | None = None
     declared_at: str = ""
     association: Association = "outside"
-
     checks, fault_prefix = {"association": one_of(ASSOCIATIONS)}, "its "
 
     @property
@@ -227,13 +237,10 @@ class Feature(Toleranced):
         return Point(self.part, None, self, end)
 
     def faults(self) -> Iterator[str]:
-        yield from self.face_faults()
-        yield from letter_faults(self.datum)
-        yield from super().faults()
+        yield from chain(self.face_faults(), letter_faults(self.datum), super().faults())
         yield from self.tolerance_faults(len(self.faces))
 
     def face_faults(self) -> Iterator[str]:
-        """Yield the faults of the faces alone."""
         for face in self.faces:
             yield from face.faults()
             if face.part is not self.part:
@@ -256,24 +263,22 @@ class Pattern(Toleranced):
     size. Only a pattern without tolerances, which is a datum alone, may have unlike members and features declared before.
     """
 
-    noun, has_members = "pattern", True
-
     name: str
     part: Part
     constituents: tuple[tuple[Face, ...] | Feature, ...]
     tolerances: tuple[Control, ...] = ()
     datum: str | None = None
     declared_at: str = ""
+    noun, has_members = "pattern", True
 
     @cached_property
     def members(self) -> tuple[Feature, ...]:
         """The features of the pattern."""
         return tuple(
-            constituent
-            if isinstance(constituent, Feature)
-            else Feature(f"{self.name} {number}", self.part, constituent, self.tolerances, None, self.declared_at)
-            for number, constituent in enumerate(self.constituents, start=1)
-        )
+            member if isinstance(member, Feature)
+            else Feature(f"{self.name} {number}", self.part, member, self.tolerances, None, self.declared_at)
+            for number, member in enumerate(self.constituents, start=1)
+        )  # fmt: skip
 
     @property
     def borrowed(self) -> tuple[Feature, ...]:
@@ -283,12 +288,11 @@ class Pattern(Toleranced):
     def faults(self) -> Iterator[str]:
         if len(self.members) < 2:
             yield f"it has {len(self.members)} member(s); expected two or more; declare one with part.feature(...)"
-        for member in self.members:
-            if member not in self.borrowed:
-                yield from (f'member "{member.name}": {fault}' for fault in member.face_faults())
+        for member in (member for member in self.members if member not in self.borrowed):
+            yield from (f'member "{member.name}": {fault}' for fault in member.face_faults())
         yield from letter_faults(self.datum)
         for feature in self.borrowed:
-            if not any(feature is declared for declared in self.part.toleranced):
+            if feature not in self.part.toleranced:
                 yield f'its member "{feature.name}" is no feature of part "{self.part.name}"; take one of that part'
             elif self.tolerances:
                 yield (
@@ -310,11 +314,10 @@ class DatumTargets(Declaration):
     Several features may have targets of one datum. More targets than it locks freedoms count by least squares.
     """
 
-    noun: ClassVar[str] = "datum"
-
     letter: str
     points: tuple[Point, ...]
     declared_at: str = ""
+    noun: ClassVar[str] = "datum"
 
     @property
     def name(self) -> str:  # type: ignore[override]

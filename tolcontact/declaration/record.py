@@ -2,7 +2,7 @@
 
 import inspect
 import operator
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, replace
 from functools import cached_property, reduce
 from types import MappingProxyType, NoneType
@@ -12,8 +12,7 @@ import msgspec
 import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
-from tolcontact.declaration.codec import CODECS, Codec, Document, Items, Plain, floats, reference
-from tolcontact.declaration.place import EntryError, Place
+from tolcontact.declaration.codec import CODECS, Codec, Document, EntryError, Items, Place, Plain, Writing, floats, reference
 from tolcontact.errors import TolcontactError
 
 
@@ -23,7 +22,7 @@ class Field:
 
     codecs        by the keys
     split         returns the values of a thing by these keys; keys without a value are left out
-    join          returns arguments for the class from the values of an entry, and its place
+    join          returns arguments for the class from the values of an entry, and its place; None if they are read elsewhere
     is_nullable   whether entries may be null
     is_required   whether an entry has to have the keys
     default       in the JSON schema, if it is a plain value
@@ -31,16 +30,10 @@ class Field:
 
     codecs: Mapping[str, Codec]
     split: Callable[[Any, Any], Document]
-    join: Callable[[Document, Place], Document]
+    join: Callable[[Document, Place], Document] | None = None
     is_nullable: bool = False
     is_required: bool = False
     default: Any = UNSET
-
-    def members(self) -> Iterator[tuple[str, Any] | tuple[str, Any, Any]]:
-        """Yield the names, types and defaults of its keys, for msgspec."""
-        for key, codec in self.codecs.items():
-            wire = codec.wire | None if self.is_nullable else codec.wire
-            yield (key, wire) if self.is_required else (key, wire | UnsetType, UNSET)
 
 
 class Record(Codec):
@@ -54,26 +47,18 @@ class Record(Codec):
     omitted   names of fields that are left out if they have their default values
     floats    names of fields whose numbers are written as floats
     build     makes a thing of its fields, if the class itself does not
+    when      condition of a thing that is written so
     codecs    codecs of fields whose type and check do not determine them
     """
 
     def __init__(
-        self,
-        cls: Any,
-        *,
-        mark: str = "",
-        marked: int = 1,
-        kind: str = "",
-        fields: str = "",
-        keys: Mapping[str, str] = MappingProxyType({}),
-        omitted: str = "",
-        floats: str = "",
-        name: str = "",
-        build: Callable[..., Any] | None = None,
+        self, cls: Any, *, mark: str = "", marked: int = 1, kind: str = "", fields: str = "",
+        keys: Mapping[str, str] = MappingProxyType({}), omitted: str = "", floats: str = "", name: str = "",
+        build: Callable[..., Any] | None = None, when: Callable[[Any, Any], bool] = lambda thing, writing: True,
         **codecs: Codec | Field,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.cls, self.mark, self.kind, self.build, self.name = cls, mark, kind, build or cls, name or cls.__name__
-        self.wire, self._codecs = reference(self.name), codecs
+        self.wire, self.when, self._codecs = reference(self.name), when, codecs
         self.names, self._marked = fields.split() or list(inspect.signature(cls).parameters), marked if mark else 0
         self._keys, self._omitted, self._floats = keys, omitted.split(), floats.split()
 
@@ -95,7 +80,7 @@ class Record(Codec):
         factory = getattr(getattr(self.cls, "__dataclass_fields__", {}).get(name), "default_factory", MISSING)
         usual = default if factory is MISSING else factory()
 
-        def split(thing: Any, writing: Any) -> Document:
+        def split(thing: Any, writing: Writing) -> Document:
             value = tuple(getattr(thing, member) for member in (name, *others)) if others else getattr(thing, name)
             is_default = is_omitted and not isinstance(value, np.ndarray) and value == usual
             return {} if is_default else {key: value}
@@ -127,11 +112,16 @@ class Record(Codec):
     @cached_property
     def struct(self) -> Any:
         """The type of an entry for msgspec."""
-        kind = [("kind", Annotated[str, Meta(extra_json_schema={"const": self.kind})])] if self.kind else []
-        members = [*kind, *(member for field in self.fields for member in field.members())]
+        members: list[Any] = []
+        if self.kind:
+            members.append(("kind", Annotated[str, Meta(extra_json_schema={"const": self.kind})]))
+        for field in self.fields:
+            for key, codec in field.codecs.items():
+                wire = codec.wire | None if field.is_nullable else codec.wire
+                members.append((key, wire) if field.is_required else (key, wire | UnsetType, UNSET))
         return msgspec.defstruct(self.name, members, forbid_unknown_fields=True, kw_only=True)
 
-    def encode(self, value: Any, writing: Any) -> Document:
+    def encode(self, value: Any, writing: Writing) -> Document:
         entry: Document = {"kind": self.kind} if self.kind else {}
         for field in self.fields:
             values = field.split(value, writing)
@@ -142,6 +132,8 @@ class Record(Codec):
         struct = place.converted(entry, self.struct)
         place = replace(place, record=place.record or struct)
         for field in self.fields:
+            if field.join is None:
+                continue
             entries = {key: item for key in field.codecs if (item := getattr(struct, key)) is not UNSET}
             values = {
                 key: None if item is None and field.is_nullable else field.codecs[key].decode(item, place[key])
@@ -172,8 +164,8 @@ class Record(Codec):
             return isinstance(entry, dict) and entry.get("kind") == self.kind
         return isinstance(entry, dict) and (not self.mark or self.mark in entry)
 
-    def holds(self, value: Any, writing: Any) -> bool:
-        return isinstance(value, self.cls) and self.kind in ("", getattr(value, "kind", ""))
+    def holds(self, value: Any, writing: Writing) -> bool:
+        return isinstance(value, self.cls) and self.kind in ("", getattr(value, "kind", "")) and self.when(value, writing)
 
     def definition(self) -> Document:
         schema = next(iter(msgspec.json.schema_components([self.struct], ref_template="#/$defs/{name}")[1].values()))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.declaration.geometry import UNITS
-from tolcontact.declaration.tolerance_class import RANGES, WIDTHS
+from tolcontact.declaration.written_tolerance import RANGES, WIDTHS
 
 MIN_ZONES, MAX_ZONES = 0.1, 5.0  # widths of a zone: six standard deviations, and the distance of a mean, of plausible parts
 MAX_SIZE_SHARE = 0.5  # of a nominal size: what can be no deviation from it
@@ -134,8 +134,7 @@ def doubt_of_rows(scale: Scale, label: str, values: np.ndarray) -> str:
             "leave out rows that state a missing value, or mend them"
         )
     zone = f"the zone of {scale.width:.4g} mm" if is_zone_known else f"a length of {scale.extent:.4g} mm"
-    cause = scale.cause(centre, width)
-    advice = "check their units"
+    cause, advice = scale.cause(centre, width), "check their units"
     if cause is not None and cause.is_absolute and not scale.size:
         advice = f"they are probably {cause}: subtract the nominal value {scale.nominal:.6g} from these in mm"
     elif cause is not None:
@@ -147,11 +146,9 @@ def doubt_of_distribution(scale: Scale, centre: float, width: float) -> str:
     """Return what is odd about a distribution [mm] by its median and six standard deviations; empty if it is plausible."""
     if scale.fits(centre, width):
         return ""
-    cause = scale.cause(centre, width)
-    advice = (
-        "check its units, which are mm" if cause is None else f"its numbers are probably {cause}; it is one of deviations in mm"
-    )
-    if cause is not None and cause.is_absolute:
-        advice += f": subtract the nominal value {scale.nominal:.6g}"
+    cause, advice = scale.cause(centre, width), "check its units, which are mm"
+    if cause is not None:
+        advice = f"its numbers are probably {cause}; it is one of deviations in mm"
+        advice += f": subtract the nominal value {scale.nominal:.6g}" if cause.is_absolute else ""
     zone = f"the zone of {scale.width:.4g} mm" if scale.width else f"a length of {scale.extent:.4g} mm"
     return f"its distribution is around {centre:.6g} and {width:.2g} mm wide (6 sigma), which does not fit {zone}; {advice}"

@@ -16,11 +16,11 @@ from types import MappingProxyType
 from typing import Any
 
 from tolcontact.declaration import Assembly
+from tolcontact.declaration.codec import EntryError, Sources
 from tolcontact.declaration.document import assembly_of, json_schema, to_document
 from tolcontact.declaration.geometry import Mesh
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face
-from tolcontact.declaration.place import EntryError, Sources
 from tolcontact.errors import ScriptError, TolcontactError, nearest_name
 from tolcontact.input_files import fault_of
 from tolcontact.replacing import replacing
@@ -31,6 +31,7 @@ PACKAGES = ("tolcontact.declaration", "tolcontact.geometry", "tolcontact.fastene
 MAX_BYTES = 1 << 26  # of a file
 NO_ARGUMENTS: Mapping[str, Any] = MappingProxyType({})
 SCHEMA_NAME = "model.schema.json"
+_PACKAGE = Path(__file__).resolve().parent
 
 
 def read_json(path: Path) -> Assembly:
@@ -73,13 +74,6 @@ def write_json(assembly: Assembly, path: Path, triangles: Callable[[Face], list[
             new.write_text(text + "\n", encoding="utf-8")
     except OSError as error:
         raise ScriptError(f'"{path}" cannot be written: {error.strerror}') from error
-
-
-if __name__ == "__main__":
-    print(json.dumps(json_schema(), indent=1))
-
-
-_PACKAGE = Path(__file__).resolve().parent
 
 
 def parameter_fault(declare: Callable[..., Any], arguments: Mapping[str, Any]) -> str:
@@ -147,15 +141,15 @@ def _where(error: Exception, path: Path) -> str:
     if isinstance(error, SyntaxError) and error.filename and error.lineno:
         lines.append((Path(error.filename).absolute(), error.lineno))
     in_script = [line for file, line in lines if file == path.absolute()]
-    in_modules = [f"{file.name}:{line}" for file, line in lines if file != path.absolute() and _is_neighbour(file, path)]
+    in_modules = [
+        f"{file.name}:{line}"
+        for file, line in lines
+        if file != path.absolute()
+        and file.is_relative_to(path.parent.resolve())
+        and not file.is_relative_to(_PACKAGE)
+        and "site-packages" not in file.parts
+    ]
     return (f" in line {in_script[-1]}" if in_script else "") + (f" ({in_modules[-1]})" if in_modules else "")
-
-
-def _is_neighbour(file: Path, path: Path) -> bool:
-    """Return True for a module in the folder of the script that belongs to no installed package."""
-    return (
-        file.is_relative_to(path.parent.resolve()) and not file.is_relative_to(_PACKAGE) and "site-packages" not in file.parts
-    )
 
 
 def unknown_argument(error: Exception) -> str:
@@ -178,3 +172,7 @@ def unknown_argument(error: Exception) -> str:
 def _resolved(module: Any, path: list[str]) -> Any:
     """Return what a path of names leads to in a module; None if there is none."""
     return functools.reduce(lambda owner, name: getattr(owner, name, None), path, module)
+
+
+if __name__ == "__main__":
+    print(json.dumps(json_schema(), indent=1))

@@ -44,7 +44,7 @@ class Facing(Readable):
     def __str__(self) -> str:
         if isinstance(self.direction, str):
             return self.direction
-        return "facing ({})".format(", ".join(f"{c:g}" for c in self.axis))
+        return "facing ({:g}, {:g}, {:g})".format(*self.axis)
 
 
 @dataclass(frozen=True, repr=False)
@@ -85,8 +85,7 @@ class Inside(Readable):
     upper: Vector
 
     def __init__(self, lower: Any, upper: Any) -> None:
-        object.__setattr__(self, "lower", vector(lower))
-        object.__setattr__(self, "upper", vector(upper))
+        vars(self).update(lower=vector(lower), upper=vector(upper))
 
     def faults(self) -> Iterator[str]:
         if not (is_finite(self.lower) and is_finite(self.upper)):
@@ -95,8 +94,7 @@ class Inside(Readable):
             yield f"box from {self.lower} to {self.upper} is empty; its first corner must be the lower one in x, y and z"
 
     def __str__(self) -> str:
-        corners = ("({})".format(", ".join(f"{c:g}" for c in corner)) for corner in (self.lower, self.upper))
-        return "inside {} to {}".format(*corners)
+        return "inside ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})".format(*self.lower, *self.upper)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,8 +124,7 @@ class Brep(Readable):
     whole: bool | FaceGroup
 
     def __init__(self, *which: Any, whole: bool | FaceGroup = False) -> None:
-        object.__setattr__(self, "which", tuple(map(_brep_face, which)))
-        object.__setattr__(self, "whole", whole)
+        vars(self).update(which=tuple(map(_brep_face, which)), whole=whole)
 
     def __or__(self, other: "Brep") -> "Brep":
         if not isinstance(other, Brep):
@@ -163,7 +160,7 @@ def _brep_face(which: Any) -> int | str | Vector:
 
 def _brep_words(which: int | str | Vector) -> str:
     if isinstance(which, tuple):
-        return "B-rep face at ({})".format(", ".join(f"{c:g}" for c in which))
+        return "B-rep face at ({:g}, {:g}, {:g})".format(*which)
     return f"B-rep face {which if isinstance(which, int) else shown(repr(which))}"
 
 

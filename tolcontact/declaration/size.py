@@ -8,9 +8,8 @@ from typing import ClassVar, Literal, get_args
 from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of, whole_number
 from tolcontact.declaration.scale import MAX_SIZE_SHARE
 from tolcontact.declaration.tolerance import Distribution, Side, Tolerance
-from tolcontact.declaration.tolerance_class import tolerance_class
 from tolcontact.declaration.values import is_length
-from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
+from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, tolerance_class, written
 
 Moves = Literal["both", "first", "second"]
 Covariance = Literal["squared exponential", "matern 5/2", "matern 3/2"]
@@ -59,8 +58,7 @@ class Size(Checked):
             if isinstance(self.upper, str) and (stated := tolerance_class(self.upper.strip())):
                 object.__setattr__(self, "tolerance_class", str(stated))
             lower, upper = value if isinstance(value, Deviations) else (-value if is_length(value) else None, value)
-            object.__setattr__(self, "lower", lower)
-            object.__setattr__(self, "upper", upper)
+            vars(self).update(lower=lower, upper=upper)
 
     @property
     def tolerance(self) -> Tolerance:

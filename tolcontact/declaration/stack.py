@@ -166,14 +166,6 @@ def _numbers(row: Mapping[str, str], has_decimal_commas: bool) -> dict[str, floa
     return numbers
 
 
-def _limits(text: str, nominal: float) -> Any:
-    """Return what a cell states as a tolerance. Raises ValueError for a text that states none."""
-    try:
-        return written(text, nominal=nominal)
-    except TextFault as fault:
-        raise ValueError(f'tolerance is "{shown(text)}"; {fault}') from fault
-
-
 def _measured(row: Mapping[str, str], numbers: Mapping[str, float]) -> Tolerance:
     """Return the normal distribution of a row with the mean and the standard deviation of measured parts."""
     if stated := [name for name in ("tolerance", "upper", "lower", "distribution", "cp", "cpk") if row.get(name)]:
@@ -192,19 +184,21 @@ def _measured(row: Mapping[str, str], numbers: Mapping[str, float]) -> Tolerance
 def _zone(row: Mapping[str, str], numbers: Mapping[str, float]) -> tuple[float, Any]:
     """Return the nominal value and the tolerance of a row. Raises ValueError for a cell that is empty or states neither."""
     is_measured = any(name in numbers for name in MEASURED)
-    limits = (
-        ("mean", "sd")
-        if is_measured or not {"tolerance", "upper"} & set(row)
-        else ("tolerance",)
-        if "tolerance" in row
-        else ("upper", "lower")
-    )
+    limits: tuple[str, ...] = ("tolerance",) if "tolerance" in row else ("upper", "lower")
+    if is_measured or not {"tolerance", "upper"} & set(row):
+        limits = "mean", "sd"
     if empty := [name for name in ("name", "nominal", *limits) if not row.get(name)]:
         raise ValueError(f"{' and '.join(empty)} {'is' if len(empty) == 1 else 'are'} empty")
     nominal = numbers["nominal"]
     if is_measured:
         return nominal, _measured(row, numbers)
-    zone = _limits(row["tolerance"], nominal) if "tolerance" in row else written((numbers["lower"], numbers["upper"]))
+    if "tolerance" in row:
+        try:
+            zone = written(row["tolerance"], nominal=nominal)
+        except TextFault as fault:
+            raise ValueError(f'tolerance is "{shown(row["tolerance"])}"; {fault}') from fault
+    else:
+        zone = written((numbers["lower"], numbers["upper"]))
     options: dict[str, Any] = {name: numbers[name] for name in ("cp", "cpk") if name in numbers}
     tolerance = Tolerance(zone, row.get("distribution") or "normal", **options)
     if reason := next(tolerance.faults(), ""):

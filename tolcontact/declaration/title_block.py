@@ -1,7 +1,7 @@
 """The title block of a report: entries that identify a document in a customer's files."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from tolcontact.declaration.values import is_line
@@ -36,7 +36,7 @@ class TitleBlock:
     @property
     def entries(self) -> dict[str, str]:
         """All entries by name."""
-        return {member.name: getattr(self, member.name) for member in fields(self)}
+        return dict(vars(self))
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -45,7 +45,7 @@ class TitleBlock:
 
     def overridden(self, entries: Mapping[str, str | None]) -> "TitleBlock":
         """Return the title block with other entries, where they are not None. Raises OptionError for a faulty one."""
-        block = TitleBlock(**{**self.entries, **{name: value for name, value in entries.items() if value is not None}})
+        block = replace(self, **{name: value for name, value in entries.items() if value is not None})
         for fault in block.faults():
             raise OptionError(f"title block: {fault}")
         return block

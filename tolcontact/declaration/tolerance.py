@@ -84,9 +84,12 @@ class Tolerance(Readable):
                 yield f"{option} is given, which goes with a normal distribution; leave it out"
         if self.cpk is not None and (self.cp is None or (is_length(self.cpk) and is_length(self.cp) and self.cpk > self.cp)):
             yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk not above it"
-
         yield from side_faults(self.side, self.cpk)
-        yield from parts_faults(self.parts, self.distribution)
+        if self.parts is not None and not (type(self.parts) is int and self.parts >= MIN_PARTS):
+            expected = f"a whole number, {MIN_PARTS} or more: fewer do not show a standard deviation"
+            yield f"parts is {self.parts!r}; expected {expected}"
+        if self.parts is not None and getattr(getattr(self.distribution, "dist", None), "name", "") != "norm":
+            yield "parts is given, which goes with a mean and a standard deviation: distribution=scipy.stats.norm(mean, sd)"
 
     def _scipy_faults(self) -> Iterator[str]:
         frozen = self.frozen
@@ -171,16 +174,6 @@ def side_faults(side: Any, cpk: Any) -> Iterator[str]:
         yield f"side is {side!r}; expected up, down or either"
     elif side is not None and cpk is None:
         yield "side is given without cpk, which states how far the mean is off; leave it out"
-
-
-def parts_faults(parts: Any, distribution: Any) -> Iterator[str]:
-    """Yield the fault of a number of parts that a distribution was estimated from."""
-    if parts is None:
-        return
-    if not (type(parts) is int and parts >= MIN_PARTS):
-        yield f"parts is {parts!r}; expected a whole number, {MIN_PARTS} or more: fewer do not show a standard deviation"
-    if getattr(getattr(distribution, "dist", None), "name", "") != "norm":
-        yield "parts is given, which goes with a mean and a standard deviation: distribution=scipy.stats.norm(mean, sd)"
 
 
 def tolerance(value: Any) -> Tolerance:

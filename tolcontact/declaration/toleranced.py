@@ -51,19 +51,15 @@ class Toleranced(Declaration):
         """Yield the faults of the tolerances, each and together, for a number of faces."""
         for tolerance in self.tolerances:
             yield from (f"{tolerance.kind}: {fault}" for fault in tolerance.faults())
-        yield from self._datum_faults()
-        yield from self._size_faults(faces)
-        yield from self._form_faults()
-
-    def _datum_faults(self) -> Iterator[str]:
         for tolerance in self.geometric:
             is_common = self.combines(tolerance) and tolerance.of is Position
             if tolerance.of.needs_datums and not tolerance.datums and not is_common:
                 example = f'tc.{tolerance.of.name}({tolerance.width!r}, "A|B|C")'
                 yield f"{tolerance.kind}: it needs datums; give them as in {example}"
-
             if tolerance.combined is not None and not self.has_members:
                 yield f"{tolerance.kind}: combined zones are for patterns; leave combined out"
+        yield from self._size_faults(faces)
+        yield from self._form_faults()
 
     def combines(self, tolerance: GeometricTolerance) -> bool:
         """Return whether the zones of its members keep their places to each other."""
@@ -72,9 +68,8 @@ class Toleranced(Declaration):
     @property
     def is_enveloped(self) -> bool:
         """Whether its form stays inside the envelope of its size."""
-        if self.size is None:
-            return False
-        return bool(self.part.standard == "ASME" if self.size.envelope is None else self.size.envelope)
+        stated = self.size.envelope if self.size else False
+        return bool(self.part.standard == "ASME" if stated is None else stated)
 
     def _size_faults(self, faces: int) -> Iterator[str]:
         if sum(isinstance(tolerance, Size) for tolerance in self.tolerances) > 1:

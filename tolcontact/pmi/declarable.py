@@ -7,7 +7,7 @@ from typing import Any
 from tolcontact.declaration import feature_tolerance as declared
 from tolcontact.declaration.feature_tolerance import KINDS as DECLARED_KINDS, GeometricTolerance
 from tolcontact.declaration.size import Size
-from tolcontact.declaration.tolerance_class import UndefinedClass, tolerance_class
+from tolcontact.declaration.written_tolerance import TextFault, tolerance_class
 from tolcontact.features.tolerance_kinds import is_drawn
 from tolcontact.pmi.annotations import DatumReference, Dimension, Tolerance
 from tolcontact.pmi.modifiers import OF_DATUMS, OF_TOLERANCES, Modifier
@@ -109,7 +109,7 @@ def _limits(stated: Dimension, nominal: float, is_inner: bool) -> tuple[float, f
     try:
         fit = tolerance_class("".join(stated.fit.split()[:1]))
         lower, upper = fit.deviations(basis) if fit else (math.nan, math.nan)
-    except UndefinedClass as error:
+    except TextFault as error:
         raise Undeclared(str(error)) from error
     if fit is None:
         raise Undeclared(f"its fit {stated.fit} is no tolerance class of ISO 286-1")

@@ -8,7 +8,9 @@ from tolcontact.vocabulary.labels import (
     AXES,
     AXIS,
     BODY_AXIS,
-    MEASURE,
+    ESTIMATE,
+    INTERVAL,
+    OUTSIDE,
     STATE,
     STATES,
     STATUS_MEANING,
@@ -16,7 +18,6 @@ from tolcontact.vocabulary.labels import (
     ArchiveVariable,
     variable,
 )
-from tolcontact.vocabulary.summary import ESTIMATE, INTERVAL, OUTSIDE
 
 ANALYSES_GROUP = "statistics"  # the group of an archive that holds a group for each analysis
 GroupedBy = Literal["contributor", "feature", "part"]
@@ -66,148 +67,102 @@ class AnalysisRecord:
 
 
 def _by_status(*dims: str) -> ArchiveVariable:
-    return variable(f"i8 by_status({', '.join((*dims, STATUS_MEANING))})", "number of realizations", "1")
+    return variable(f"i8 by_status({', '.join((*dims, STATUS_MEANING))}) [1]", "number of realizations")
 
 
-_INDEX = (MEASURE, STATE, GROUP, INTERVAL)
-CONTRIBUTIONS = AnalysisRecord(
-    "contributions",
-    "contributions to the measurements of {assembly}",
-    (
-        variable(
-            "f8 first(measure, state, group, interval)", "first-order Sobol' index: share of variance by a group alone", "1"
-        ),
-        variable(
-            "f8 total(measure, state, group, interval)",
-            "total Sobol' index: share of variance by a group and its interactions",
-            "1",
-        ),
-        variable("i1 minor(group)", "1: estimated together with all other minor groups; 0: alone", "1"),
-        variable("f8 minor_total(measure, state, interval)", "total Sobol' index of all minor groups together", "1"),
-        variable(
-            "f8 shapley(measure, state, unit, interval)", "Shapley effect: share of variance, also of what is correlated", "1"
-        ),
-        variable("f8 linear(measure, group)", "share of variance by the linear sensitivities at the nominal assembly", "1"),
-        variable("f8 missed(measure, state, interval)", "share of variance that the linear prediction misses", "1"),
-        _by_status(),
+CONTRIBUTIONS = AnalysisRecord("contributions", "contributions to the measurements of {assembly}", (
+    variable("f8 first(measure, state, group, interval) [1]", "first-order Sobol' index: share of variance by a group alone"),
+    variable(
+        "f8 total(measure, state, group, interval) [1]", "total Sobol' index: share of variance by a group and its interactions"
     ),
-)
-SENSITIVITIES = AnalysisRecord(
-    "sensitivities",
-    "sensitivities of the measurements of {assembly}",
-    (
-        variable("f8 nominal(measure, contributor)", "derivative of the raw measure at the nominal assembly"),
-        variable("f8 leverage(contributor)", "largest displacement of the located part for a unit of its locator", "1"),
-        variable("f8 sensitivity(measure, state, contributor, interval)", "mean derivative over all realizations"),
-        variable("f8 spread(measure, state, contributor)", "standard deviation of the derivative over realizations"),
-        variable(
-            "f8 by_contact(measure, contact, contributor, interval)",
-            "mean derivative with contact: where parts stay apart, and where they touch",
-        ),
-        variable("f8 changing(contributor, interval)", "share of realizations with a kink or a jump within the step", "1"),
-        variable("f8 step(contributor)", "step of the differences, up and down"),
-        _by_status(),
+    variable("i1 minor(group) [1]", "1: estimated together with all other minor groups; 0: alone"),
+    variable("f8 minor_total(measure, state, interval) [1]", "total Sobol' index of all minor groups together"),
+    variable("f8 shapley(measure, state, unit, interval) [1]", "Shapley effect: share of variance, also of what is correlated"),
+    variable("f8 linear(measure, group) [1]", "share of variance by the linear sensitivities at the nominal assembly"),
+    variable("f8 missed(measure, state, interval) [1]", "share of variance that the linear prediction misses"),
+    _by_status(),
+))  # fmt: skip
+SENSITIVITIES = AnalysisRecord("sensitivities", "sensitivities of the measurements of {assembly}", (
+    variable("f8 nominal(measure, contributor)", "derivative of the raw measure at the nominal assembly"),
+    variable("f8 leverage(contributor) [1]", "largest displacement of the located part for a unit of its locator"),
+    variable("f8 sensitivity(measure, state, contributor, interval)", "mean derivative over all realizations"),
+    variable("f8 spread(measure, state, contributor)", "standard deviation of the derivative over realizations"),
+    variable(
+        "f8 by_contact(measure, contact, contributor, interval)",
+        "mean derivative with contact: where parts stay apart, and where they touch",
     ),
-)
-WORST_CASE = AnalysisRecord(
-    "worst_case",
-    "worst cases of the measurements of {assembly}",
-    (
-        variable("f8 worst(measure, state, end)", "worst-case minimum and maximum, found by searches"),
-        variable("f8 deviations(measure, state, end, contributor)", "combination of deviations that gives it"),
-        variable("f8 bound(measure, state, end)", "linear estimate of the worst case, which large tilts may exceed"),
-        variable("f8 random(measure, state, end)", "worst of the random combinations"),
-        variable("i8 agreeing(measure, state, end)", "number of searches that ended at the worst case", "1"),
-        variable("i8 ends(measure, state, end)", "number of different values that searches ended at", "1"),
-        variable("f8 unseen(measure, state, end)", "expected share of starts that lead to ends not seen", "1"),
-        replace(_by_status(), long_name="number of realizations simulated"),
-        *(
-            replace(variable, dims=(CASE, *variable.dims[1:]))
-            for variable in (MEASURED, TRANSLATION, ROTATION, GAP_MIN, KKT_RESIDUAL, STATUS)
-        ),
+    variable("f8 changing(contributor, interval) [1]", "share of realizations with a kink or a jump within the step"),
+    variable("f8 step(contributor)", "step of the differences, up and down"),
+    _by_status(),
+))  # fmt: skip
+WORST_CASE = AnalysisRecord("worst_case", "worst cases of the measurements of {assembly}", (
+    variable("f8 worst(measure, state, end)", "worst-case minimum and maximum, found by searches"),
+    variable("f8 deviations(measure, state, end, contributor)", "combination of deviations that gives it"),
+    variable("f8 bound(measure, state, end)", "linear estimate of the worst case, which large tilts may exceed"),
+    variable("f8 random(measure, state, end)", "worst of the random combinations"),
+    variable("i8 agreeing(measure, state, end) [1]", "number of searches that ended at the worst case"),
+    variable("i8 ends(measure, state, end) [1]", "number of different values that searches ended at"),
+    variable("f8 unseen(measure, state, end) [1]", "expected share of starts that lead to ends not seen"),
+    replace(_by_status(), long_name="number of realizations simulated"),
+    *(
+        replace(variable, dims=(CASE, *variable.dims[1:]))
+        for variable in (MEASURED, TRANSLATION, ROTATION, GAP_MIN, KKT_RESIDUAL, STATUS)
     ),
-    of_stations=tuple(replace(variable, dims=(CASE, *variable.dims[1:])) for variable in STATION_POSES),
-)
+), of_stations=tuple(replace(variable, dims=(CASE, *variable.dims[1:])) for variable in STATION_POSES))  # fmt: skip
 COARSE = "coarse"  # attribute of an analysis that was stopped, or whose time ended: what its answer rests on
 WITHOUT_FORM = "without_form"  # attribute of worst cases: features with form, which is left out
-TAILS = AnalysisRecord(
-    "tails",
-    "rare events of {assembly}",
-    (
-        variable("f8 probability(event, interval)", "probability of a rare event", "1"),
-        variable("f8 disagreement(event)", "factor between two searches for the event; 1: they agree", "1"),
-        variable("i1 stop(event)", "1: many values were at a limit, and none beyond; 0: not so", "1"),
-        variable("i8 simulated(event)", "number of realizations simulated", "1"),
-        replace(_by_status(EVENT), long_name="number of realizations simulated"),
+TAILS = AnalysisRecord("tails", "rare events of {assembly}", (
+    variable("f8 probability(event, interval) [1]", "probability of a rare event"),
+    variable("f8 disagreement(event) [1]", "factor between two searches for the event; 1: they agree"),
+    variable("i1 stop(event) [1]", "1: many values were at a limit, and none beyond; 0: not so"),
+    variable("i8 simulated(event) [1]", "number of realizations simulated"),
+    replace(_by_status(EVENT), long_name="number of realizations simulated"),
+))  # fmt: skip
+ALLOCATION = AnalysisRecord("allocation", "allocation of tolerances of {assembly}", (
+    variable("f8 range(group, stage)", "full width of the zones of a group; not a number if they differ"),
+    variable("f8 factor(group) [1]", "full width after / before"),
+    variable("f8 cost(group, stage) [1]", "cost of the ranges"),
+    variable("f8 kept(requirement, stage, interval) [1]", "share outside of the limits, or Ppk, in a fresh run"),
+    variable("i1 met(requirement) [1]", "1: kept in the fresh run after; 0: not, by any ranges found"),
+    variable("f8 required(requirement) [1]", "share outside of the limits at most, or Ppk at least"),
+    variable("i1 idle(group) [1]", "1: no influence on any requirement, so the ranges stay; 0: not so"),
+    variable("f8 effect(measure, of_effect, group, interval)", "change if zones were a tenth narrower"),
+))  # fmt: skip
+RELOCATION = AnalysisRecord("relocation", "place of {locator} in {assembly}", (
+    variable("f8 point(stage, axis) [mm]", "place of the locator, in its part's own frame"),
+    variable("f8 reached(stage, interval)", "value of the objective in a fresh run"),
+    variable("f8 change(interval) [1]", "6 sigma after / before; or share outside, after minus before"),
+    variable("i8 unresolved(stage) [1]", "number of realizations of the fresh run that were not resolved"),
+    variable("f8 tried(trial, axis) [mm]", "trial positions, in the part's own frame"),
+    variable("f8 tried_value(trial)", "value of the objective at each trial position"),
+))  # fmt: skip
+SEATING = AnalysisRecord("seating", "friction at the seats of {assembly}", (
+    variable("f8 critical(seat) [1]", "least coefficient of friction that can hold the part short of the seat"),
+    variable("f8 reserve(seat) [1]", "least factor of the stated coefficients at which the part can be held short of the seat"),
+    variable("f8 share(seat, holder) [1]", "share of the normal forces that then hold the part"),
+))  # fmt: skip
+STACK_UP = AnalysisRecord("stack_up", "stack-up of the measurements of {assembly}", (
+    variable("f8 drawn(measure)", "value without deviations"),
+    variable("f8 centred(measure)", "linear value at the centres of all zones"),
+    variable("f8 half_width(measure, approach)", "half of the range about the centred value, by linear sensitivities"),
+    variable("f8 lots(measure)", "largest shift of the mean by lots with means on either side, by linear sensitivities"),
+    variable("f8 simulated(measure, state, end, interval)", "0.135 % and 99.865 % percentiles of the realizations"),
+    variable("i8 links(measure) [1]", "number of contributors that have an effect"),
+    variable("i8 forms(measure) [1]", "number of forms of faces among them"),
+    _by_status(),
+))  # fmt: skip
+SWEEP = AnalysisRecord("sweep", "envelope of the measurements of {assembly}", (
+    variable(
+        "f8 envelope(measure, state, end, of_envelope, interval)",
+        "mean, 6 sigma and outer percentile of the least and of the largest value over all positions",
     ),
-)
-ALLOCATION = AnalysisRecord(
-    "allocation",
-    "allocation of tolerances of {assembly}",
-    (
-        variable("f8 range(group, stage)", "full width of the zones of a group; not a number if they differ"),
-        variable("f8 factor(group)", "full width after / before", "1"),
-        variable("f8 cost(group, stage)", "cost of the ranges", "1"),
-        variable("f8 kept(requirement, stage, interval)", "share outside of the limits, or Ppk, in a fresh run", "1"),
-        variable("i1 met(requirement)", "1: kept in the fresh run after; 0: not, by any ranges found", "1"),
-        variable("f8 required(requirement)", "share outside of the limits at most, or Ppk at least", "1"),
-        variable("i1 idle(group)", "1: no influence on any requirement, so the ranges stay; 0: not so", "1"),
-        variable("f8 effect(measure, of_effect, group, interval)", "change if zones were a tenth narrower"),
-    ),
-)
-RELOCATION = AnalysisRecord(
-    "relocation",
-    "place of {locator} in {assembly}",
-    (
-        variable("f8 point(stage, axis)", "place of the locator, in its part's own frame", "mm"),
-        variable("f8 reached(stage, interval)", "value of the objective in a fresh run"),
-        variable("f8 change(interval)", "6 sigma after / before; or share outside, after minus before", "1"),
-        variable("i8 unresolved(stage)", "number of realizations of the fresh run that were not resolved", "1"),
-        variable("f8 tried(trial, axis)", "trial positions, in the part's own frame", "mm"),
-        variable("f8 tried_value(trial)", "value of the objective at each trial position"),
-    ),
-)
-SEATING = AnalysisRecord(
-    "seating",
-    "friction at the seats of {assembly}",
-    (
-        variable("f8 critical(seat)", "least coefficient of friction that can hold the part short of the seat", "1"),
-        variable(
-            "f8 reserve(seat)", "least factor of the stated coefficients at which the part can be held short of the seat", "1"
-        ),
-        variable("f8 share(seat, holder)", "share of the normal forces that then hold the part", "1"),
-    ),
-)
-STACK_UP = AnalysisRecord(
-    "stack_up",
-    "stack-up of the measurements of {assembly}",
-    (
-        variable("f8 drawn(measure)", "value without deviations"),
-        variable("f8 centred(measure)", "linear value at the centres of all zones"),
-        variable("f8 half_width(measure, approach)", "half of the range about the centred value, by linear sensitivities"),
-        variable("f8 lots(measure)", "largest shift of the mean by lots with means on either side, by linear sensitivities"),
-        variable("f8 simulated(measure, state, end, interval)", "0.135 % and 99.865 % percentiles of the realizations"),
-        variable("i8 links(measure)", "number of contributors that have an effect", "1"),
-        variable("i8 forms(measure)", "number of forms of faces among them", "1"),
-        _by_status(),
-    ),
-)
-SWEEP = AnalysisRecord(
-    "sweep",
-    "envelope of the measurements of {assembly}",
-    (
-        variable(
-            "f8 envelope(measure, state, end, of_envelope, interval)",
-            "mean, 6 sigma and outer percentile of the least and of the largest value over all positions",
-        ),
-        variable("f8 outside(measure, state, interval)", "share of realizations out of specification at any position", "1"),
-        variable("f8 extreme_share(measure, state, end, position)", "share of realizations with this extreme there", "1"),
-        variable("f8 mean(measure, state, position, interval)", "mean at each position"),
-        variable("f8 swept(position, realization, state, measure)", "values at each position"),
-        variable("f8 parameter(parameter_name, position)", "parameters of the mechanism", "1"),
-        _by_status("position"),
-    ),
-)
+    variable("f8 outside(measure, state, interval) [1]", "share of realizations out of specification at any position"),
+    variable("f8 extreme_share(measure, state, end, position) [1]", "share of realizations with this extreme there"),
+    variable("f8 mean(measure, state, position, interval)", "mean at each position"),
+    variable("f8 swept(position, realization, state, measure)", "values at each position"),
+    variable("f8 parameter(parameter_name, position) [1]", "parameters of the mechanism"),
+    _by_status("position"),
+))  # fmt: skip
 _RECORDS = STACK_UP, CONTRIBUTIONS, SENSITIVITIES, WORST_CASE, TAILS, ALLOCATION, RELOCATION, SEATING, SWEEP
 ANALYSES = {record.name: record for record in _RECORDS}
 

@@ -7,6 +7,10 @@ from tolcontact.vocabulary.labels import (
     BODY_AXIS,
     BOUND,
     BY_OBJECTIVE,
+    CLASH_DEPTH,
+    CLASH_OTHER,
+    CLASH_PART,
+    CLASHES,
     COMPONENT,
     MEASURE,
     PAIR,
@@ -14,9 +18,9 @@ from tolcontact.vocabulary.labels import (
     STATE,
     STATUS_MEANINGS,
     label,
+    surface_variables,
     variable,
 )
-from tolcontact.vocabulary.surface import CLASH_DEPTH, CLASH_OTHER, CLASH_PART, CLASHES, surface_variables
 from tolcontact.vocabulary.variation import DEVIATION
 
 BREP_FACE, ROUND_POINT = "brep_face", "round_point"
@@ -32,24 +36,24 @@ POINT_OF_ROUND = variable(
 )
 OF_WALL = surface_variables("wall", ROUND_POINT, "the wall that a ball or shaft may touch, nominal")
 OF_ROUND = {
-    "is_hollow": variable("i1 wall_is_hollow(round_point)", "1 if the wall is around the ball or shaft", "1"),
-    "towards": variable("f8 wall_middle(round_point, axis)", "unit vector from a hollow wall's axis to its middle", "1"),
-    "opening": variable("f8 wall_opening(round_point)", "angle that a hollow wall reaches to either side; pi: whole", "rad"),
+    "is_hollow": variable("i1 wall_is_hollow(round_point) [1]", "1 if the wall is around the ball or shaft"),
+    "towards": variable("f8 wall_middle(round_point, axis) [1]", "unit vector from a hollow wall's axis to its middle"),
+    "opening": variable("f8 wall_opening(round_point) [rad]", "angle that a hollow wall reaches to either side; pi: whole"),
     "cut": variable(
-        "f8 wall_end(round_point, axis)", "unit normal of the plane at the end of the wall; 0: the shaft itself ends", "1"
+        "f8 wall_end(round_point, axis) [1]", "unit normal of the plane at the end of the wall; 0: the shaft itself ends"
     ),
-    "centre": variable("f8 round_centre(round_point, axis)", "centre of the ball, or of the shaft's end, nominal", "mm"),
-    "axis": variable("f8 round_axis(round_point, axis)", "unit vector of the shaft's axis, nominal; 0 of a ball", "1"),
-    "radius": variable("f8 round_radius(round_point)", "radius of the ball or shaft", "mm"),
+    "centre": variable("f8 round_centre(round_point, axis) [mm]", "centre of the ball, or of the shaft's end, nominal"),
+    "axis": variable("f8 round_axis(round_point, axis) [1]", "unit vector of the shaft's axis, nominal; 0 of a ball"),
+    "radius": variable("f8 round_radius(round_point) [mm]", "radius of the ball or shaft"),
     "on_moving": variable(
-        "i1 round_on_moving(round_point)", "1 if ball or shaft belong to the moving part, 0 if the wall does", "1"
+        "i1 round_on_moving(round_point) [1]", "1 if ball or shaft belong to the moving part, 0 if the wall does"
     ),
 }
 ROUND = (POINT_OF_ROUND, *OF_WALL.values(), *OF_ROUND.values())
 KNOWN_SURFACES = (BREP_OF_FACE, *OF_BREP_FACE.values())
 
 
-NUMBERS = variable("i8 realization(realization)", "number of the realization", "1", {"standard_name": "realization"})
+NUMBERS = variable("i8 realization(realization) [1]", "number of the realization", {"standard_name": "realization"})
 COORDINATES = (
     NUMBERS,
     label(STATE, "state: raw as located, corrected after contact"),
@@ -61,78 +65,55 @@ COORDINATES = (
 )
 
 MEASURED = variable(
-    "f8 measured(realization, state, measure)",
+    "f8 measured(realization, state, measure) [mm]",
     "value of a measure: displacement of a point, distance of two points, or the user's expression",
-    "mm",
 )
 TRANSLATION = variable(
-    "f8 translation(realization, state, part, axis)", "t of the pose x = R x0 + t, x0 in the nominal assembly frame", "mm"
+    "f8 translation(realization, state, part, axis) [mm]", "t of the pose x = R x0 + t, x0 in the nominal assembly frame"
 )
 ROTATION = variable(
-    "f8 rotation(realization, state, part, axis, body_axis)", "R of the pose x = R x0 + t; rows are assembly axes", "1"
+    "f8 rotation(realization, state, part, axis, body_axis) [1]", "R of the pose x = R x0 + t; rows are assembly axes"
 )
 GAP_MIN = variable(
-    "f8 gap_min(realization, state, pair)",
+    "f8 gap_min(realization, state, pair) [mm]",
     "smallest gap of all contact points of a pair, larger by coordinate_error if there is one; negative: penetration; "
     "infinite: the faces are opposite each other nowhere",
-    "mm",
 )
-ACTIVE = variable("i4 active(realization, pair)", "number of active contact points in the raw state", "1")
-CARRYING = variable("i4 carrying(realization, pair)", "number of contact points under load in the corrected state", "1")
+ACTIVE = variable("i4 active(realization, pair) [1]", "number of active contact points in the raw state")
+CARRYING = variable("i4 carrying(realization, pair) [1]", "number of contact points under load in the corrected state")
 REACTION = variable("f8 reaction(realization, pair)", "sum of the reactions of the contact points of a pair")
 KKT_RESIDUAL = variable(
-    "f8 kkt_residual(realization)",
+    "f8 kkt_residual(realization) [mm]",
     "largest residual of the optimality conditions of the contact problem; in an exact resolution also its last step",
-    "mm",
 )
-ITERATIONS = variable("i4 iterations(realization)", "number of linear steps that the contact problem took", "1")
-STARTS = variable("i1 starts(realization)", "number of places that the steps were started from", "1")
-SECOND_ANSWERS = variable("i4 second_answers(realization)", "number of QPs that another solver had to answer", "1")
+ITERATIONS = variable("i4 iterations(realization) [1]", "number of linear steps that the contact problem took")
+STARTS = variable("i1 starts(realization) [1]", "number of places that the steps were started from")
+SECOND_ANSWERS = variable("i4 second_answers(realization) [1]", "number of QPs that another solver had to answer")
 SEARCHED = variable(
-    "i1 searched(realization)",
+    "i1 searched(realization) [1]",
     "1: contact points were projected again, or found, at the poses themselves, and gap_min refers to those; "
     "0: it refers to the archived ones",
-    "1",
 )
 STATUS = variable(
     "i1 status(realization)",
     "outcome of the realization",
-    None,
     {"flag_values": [*range(len(STATUS_MEANINGS))], "flag_meanings": " ".join(STATUS_MEANINGS)},
 )
 LOCATOR_OFFSET = variable(
-    "f8 locator_offset(realization, part)",
+    "f8 locator_offset(realization, part) [mm]",
     "largest distance by which contact moved a part off a rigid two-sided locator, along the locator; 0: it has none",
-    "mm",
 )
 ROWS = (
-    MEASURED,
-    TRANSLATION,
-    ROTATION,
-    GAP_MIN,
-    ACTIVE,
-    CARRYING,
-    REACTION,
-    KKT_RESIDUAL,
-    ITERATIONS,
-    STARTS,
-    SECOND_ANSWERS,
-    SEARCHED,
-    CLASHES,
-    CLASH_DEPTH,
-    CLASH_PART,
-    CLASH_OTHER,
-    LOCATOR_OFFSET,
-    STATUS,
-)
+    MEASURED, TRANSLATION, ROTATION, GAP_MIN, ACTIVE, CARRYING, REACTION, KKT_RESIDUAL, ITERATIONS, STARTS, SECOND_ANSWERS,
+    SEARCHED, CLASHES, CLASH_DEPTH, CLASH_PART, CLASH_OTHER, LOCATOR_OFFSET, STATUS,
+)  # fmt: skip
 POSES = (TRANSLATION, ROTATION)
 
 BY_REALIZATION = (*ROWS, DEVIATION)
 
 LOCATOR_VARIATION = variable(
-    "f8 locator_variation(part)",
+    "f8 locator_variation(part) [mm]",
     "largest deviation of a rigid two-sided locator of a part: half its range, with those of its features; NaN: it has none",
-    "mm",
 )
 MEASURE_NOMINAL = variable("f8 measure_nominal(measure)", "value of the measure in the nominal assembly")
 MEASURE_TOLERANCE = variable("f8 measure_tolerance(measure)", "full width of the allowed zone; NaN if it is open")
@@ -151,85 +132,78 @@ MEASURE_UNITS = variable("str measure_units(measure)", "units of the measure")
 LINE_END = "line_end"
 MEASURE_OF_LINE = variable("i4 measure_of_line(measure_line)", "number of the measure that a line shows, counted from 0")
 LINE_ENDS = variable(
-    "f8 measure_line_ends(measure_line, line_end, axis)",
+    "f8 measure_line_ends(measure_line, line_end, axis) [mm]",
     "ends of the lines that show what is measured, nominal; gaps, axes and directions",
-    "mm",
 )
 
 DECLARATION = variable("str declaration()", "the declared model as JSON, enough to rebuild it")
-MESH_VERTICES = variable("f8 vertices(vertex, axis)", "vertices of a mesh in its part's own frame", "mm")
+MESH_VERTICES = variable("f8 vertices(vertex, axis) [mm]", "vertices of a mesh in its part's own frame")
 MESH_FACES = variable("i4 faces(face, corner)", "vertex numbers of each triangle, counted from 0")
 
 PAIR_OF_POINT = variable("i4 pair_of_point(point)", "number of the pair of each contact point, counted from 0")
 MOVING_PART = variable("i4 moving_part(pair)", "number of the moving part of each pair, counted from 0")
 REFERENCE_PART = variable("i4 reference_part(pair)", "number of the reference part of each pair, -1: the ground")
-MOVING_POINT = variable("f8 moving_point(point, axis)", "P^m: contact point of the moving part, nominal", "mm")
-REFERENCE_POINT = variable("f8 reference_point(point, axis)", "P^r: its projection on the reference part, nominal", "mm")
+MOVING_POINT = variable("f8 moving_point(point, axis) [mm]", "P^m: contact point of the moving part, nominal")
+REFERENCE_POINT = variable("f8 reference_point(point, axis) [mm]", "P^r: its projection on the reference part, nominal")
 REFERENCE_NORMAL = variable(
-    "f8 reference_normal(point, axis)", "n^r: outward unit normal of the reference part there, nominal", "1"
+    "f8 reference_normal(point, axis) [1]", "n^r: outward unit normal of the reference part there, nominal"
 )
 
-POINT_STIFFNESS = variable("f8 point_stiffness(point)", "stiffness of a contact point; infinite: it is rigid", "N mm-1")
+POINT_STIFFNESS = variable("f8 point_stiffness(point) [N mm-1]", "stiffness of a contact point; infinite: it is rigid")
 LOCATOR_OF_POINT = variable(
     "i4 locator_of_point(point)",
     "number of the one-sided locator that a contact point represents, whose deviation is subtracted from its gap; -1: none",
 )
 
 BOUNDED = variable(
-    "i1 bounded(pair)", "1: faces end, and places of contact are found at every pose; 0: contact points are fixed", "1"
+    "i1 bounded(pair) [1]", "1: faces end, and places of contact are found at every pose; 0: contact points are fixed"
 )
 PLANE_ERROR = variable(
-    "f8 plane_error(pair)",
+    "f8 plane_error(pair) [mm]",
     "largest error of fixed contact points in the depth of contact, at 1024 raw poses; NaN: not compared",
-    "mm",
 )
 
 SIDE = "side"
 SIDE_LABEL = label(SIDE, "side of a pair")
 SIDES = ("moving", "reference")
 OBJECTIVE_AREA = variable(
-    "f8 objective_area(pair, side)", "area of the part of a face that the objective counts; 0: its part is fixed", "mm2"
+    "f8 objective_area(pair, side) [mm2]", "area of the part of a face that the objective counts; 0: its part is fixed"
 )
-OBJECTIVE_CENTRE = variable("f8 objective_centre(pair, side, axis)", "centre of this part of the face, nominal", "mm")
+OBJECTIVE_CENTRE = variable("f8 objective_centre(pair, side, axis) [mm]", "centre of this part of the face, nominal")
 OBJECTIVE_MOMENT = variable(
-    "f8 objective_moment(pair, side, axis, body_axis)", "mean product of coordinates over this part, about its centre", "mm2"
+    "f8 objective_moment(pair, side, axis, body_axis) [mm2]", "mean product of coordinates over this part, about its centre"
 )
 OBJECTIVE = (SIDE_LABEL, OBJECTIVE_AREA, OBJECTIVE_CENTRE, OBJECTIVE_MOMENT)
 
 COMPONENT_LABEL = label(COMPONENT, "component of the displacement")
-FIELD_VERTICES = variable("f8 vertices(vertex, axis)", "surface points of the part, nominal", "mm")
+FIELD_VERTICES = variable("f8 vertices(vertex, axis) [mm]", "surface points of the part, nominal")
 FIELD_FACES = MESH_FACES
-FIELD_MEAN = variable("f8 mean(state, vertex, component)", "mean displacement of a surface point", "mm")
+FIELD_MEAN = variable("f8 mean(state, vertex, component) [mm]", "mean displacement of a surface point")
 FIELD_SIX_SIGMA = variable(
-    "f8 six_sigma(state, vertex, component)", "six standard deviations of the displacement of a surface point", "mm"
+    "f8 six_sigma(state, vertex, component) [mm]", "six standard deviations of the displacement of a surface point"
 )
 BOUND_LABEL = label(BOUND, "bound of a 95 % confidence interval")
 FIELD_INTERVAL = variable(
-    "f8 magnitude_six_sigma_interval(state, vertex, bound)",
+    "f8 magnitude_six_sigma_interval(state, vertex, bound) [mm]",
     "95 % confidence interval of six standard deviations of the displacement magnitude",
-    "mm",
 )
-FIELD_REALIZATIONS = variable("i8 realizations()", "number of realizations that the displacement field covers", "1")
+FIELD_REALIZATIONS = variable("i8 realizations() [1]", "number of realizations that the displacement field covers")
 MAGNITUDE_REALIZATIONS = variable(
-    "i8 magnitude_realizations()",
+    "i8 magnitude_realizations() [1]",
     "number of realizations, the first ones, that the magnitude of the displacement field covers",
-    "1",
 )
 FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL, FIELD_REALIZATIONS, MAGNITUDE_REALIZATIONS)
 TOUCHING_SHARE = variable(
-    "f8 touching(point)",
+    "f8 touching(point) [1]",
     f"share of realizations with a touching contact point, corrected: gap below {TOUCHING_GAP} mm; NaN: not known",
-    "1",
 )
-TOUCHING_INTERVAL = variable("f8 touching_interval(point, bound)", "its 95 % confidence interval", "1")
+TOUCHING_INTERVAL = variable("f8 touching_interval(point, bound) [1]", "its 95 % confidence interval")
 TOUCHING_REALIZATIONS = variable(
-    "i8 touching_realizations()", "number of realizations, of the first ones, that this share is of", "1"
+    "i8 touching_realizations() [1]", "number of realizations, of the first ones, that this share is of"
 )
 TOUCHING = (TOUCHING_SHARE, TOUCHING_INTERVAL, TOUCHING_REALIZATIONS)
-SUMMED_ROWS = variable("i8 summed_rows()", "number of realizations in `sums`; a resumed run continues after them", "1")
-FIELD_SUMS = variable(
-    "f8 sums(state, number)", "running sums of the displacement field; a resumed run continues from them", "1"
-)
+SUMMED_ROWS = variable("i8 summed_rows() [1]", "number of realizations in `sums`; a resumed run continues after them")
+FIELD_SUMS = variable("f8 sums(state, number) [1]", "running sums of the displacement field; a resumed run continues from them")
 
 
 def group_of(part: str) -> str:
@@ -252,7 +226,7 @@ MEASURED_BY_OBJECTIVE = variable(
     f"f8 measured_by_objective({BY_OBJECTIVE}, {ROW_OF_OBJECTIVES}, {MEASURE})",
     "corrected measures of the first realizations under each objective; NaN: none",
 )
-STATUS_BY_OBJECTIVE = variable(f"i1 status_by_objective({BY_OBJECTIVE}, {ROW_OF_OBJECTIVES})", "their outcomes; -1: none", None)
+STATUS_BY_OBJECTIVE = variable(f"i1 status_by_objective({BY_OBJECTIVE}, {ROW_OF_OBJECTIVES})", "their outcomes; -1: none")
 
 STATIONS_GROUP, STATION_PART = "station", "station_part"
 
@@ -263,14 +237,12 @@ OF_STATIONS = (MEASURE_STATION, PAIR_STATION, PART_STATION)
 
 STATION_PART_LABEL = label(STATION_PART, "part in the station")
 STATION_TRANSLATION = variable(
-    "f8 station_translation(realization, state, station_part, axis)", f"{TRANSLATION.long_name}; in the station", "mm"
+    "f8 station_translation(realization, state, station_part, axis) [mm]", f"{TRANSLATION.long_name}; in the station"
 )
 STATION_ROTATION = variable(
-    "f8 station_rotation(realization, state, station_part, axis, body_axis)", f"{ROTATION.long_name}; in the station", "1"
+    "f8 station_rotation(realization, state, station_part, axis, body_axis) [1]", f"{ROTATION.long_name}; in the station"
 )
-STATION_STATUS = variable(
-    "i1 station_status(realization)", "outcome of the realization in the station", None, STATUS.attributes
-)
+STATION_STATUS = variable("i1 station_status(realization)", "outcome of the realization in the station", STATUS.attributes)
 STATION_POSES = (STATION_TRANSLATION, STATION_ROTATION)
 STATION_ROWS = (*STATION_POSES, STATION_STATUS)
 

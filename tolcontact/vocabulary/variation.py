@@ -1,38 +1,34 @@
-"""Variables of an archive for what varies: contributors, locators, faces of features, planes of their datums, and form."""
+"""Variables of an archive for contributors, locators, faces of features with datums and form, and elastic parts."""
 
-from tolcontact.vocabulary.labels import CONTRIBUTOR, FEATURE_FACE, FREEDOM, LOCATOR, label, variable
-from tolcontact.vocabulary.surface import surface_variables
+from tolcontact.vocabulary.labels import CONTRIBUTOR, FEATURE_FACE, FREEDOM, LOCATOR, label, surface_variables, variable
 
 FREEDOMS = ("tau x", "tau y", "tau z", "rho x", "rho y", "rho z")
 
 DEVIATION = variable(
-    "f8 deviation(realization, contributor)",
+    "f8 deviation(realization, contributor) [mm]",
     "deviation of a contributor: of a locator along its direction, of a freedom or the size of a feature, or of a variable; "
     "with what shared variables add to it",
-    "mm",
 )
 CONTRIBUTOR_LABEL = label(CONTRIBUTOR, "contributor, as part.locator, part.feature.freedom, or a variable's name")
 CONTRIBUTOR_SOURCE = variable("str source(contributor)", "what a contributor is of: locator, feature or variable")
 CONTRIBUTOR_UNITS = variable("str contributor_units(contributor)", "units of the deviation of a contributor")
 TOLERANCE_RANGE = variable(
-    "f8 tolerance_range(contributor)",
-    "full width of the tolerance zone; NaN if the distribution alone defines the spread",
-    "mm",
+    "f8 tolerance_range(contributor) [mm]", "full width of the tolerance zone; NaN if the distribution alone defines the spread"
 )
 DISTRIBUTION = variable(
     "str distribution(contributor)",
     "distribution of the deviation; of a feature its tolerance, and the rule from zone to spread",
 )
-PARTS = variable("i8 parts(contributor)", "number of parts that its distribution was estimated from; 0 if it is known", "1")
+PARTS = variable("i8 parts(contributor) [1]", "number of parts that its distribution was estimated from; 0 if it is known")
 MEAN_SHIFT = variable(
-    "f8 mean_shift(contributor)", "mean of the contributor's own distribution, without what shared variables add to it", "mm"
+    "f8 mean_shift(contributor) [mm]", "mean of the contributor's own distribution, without what shared variables add to it"
 )
 
 LOCATOR_LABEL = label(LOCATOR, "locator, as part.locator: contributors of the same number")
-STIFFNESS = variable("f8 stiffness(locator)", "stiffness of the locator", "N mm-1")
+STIFFNESS = variable("f8 stiffness(locator) [N mm-1]", "stiffness of the locator")
 ONE_SIDED = variable("i1 one_sided(locator)", "1: a support that the part may lift off, 0: two-sided")
-LOCATOR_POINT = variable("f8 locator_point(locator, axis)", "where the locator holds its part, nominal", "mm")
-LOCATOR_DIRECTION = variable("f8 locator_direction(locator, axis)", "direction of the deviation, into the part", "1")
+LOCATOR_POINT = variable("f8 locator_point(locator, axis) [mm]", "where the locator holds its part, nominal")
+LOCATOR_DIRECTION = variable("f8 locator_direction(locator, axis) [1]", "direction of the deviation, into the part")
 FACE_OF_LOCATOR = variable("i4 face_of_locator(locator)", "index of the feature's face at a locator; -1: none")
 
 GROUND_OF_LOCATOR = variable(
@@ -42,17 +38,12 @@ GROUND_OF_LOCATOR = variable(
 
 FREEDOM_LABEL = label(FREEDOM, "component of a small displacement p -> p + tau + rho x (p - centre)")
 FEATURE_OF_FACE = variable("str feature_of_face(feature_face)", "feature that a face belongs to, as part.feature")
-FACE_CENTRE = variable("f8 face_centre(feature_face, axis)", "centre of rotation of a feature's face, nominal", "mm")
+FACE_CENTRE = variable("f8 face_centre(feature_face, axis) [mm]", "centre of rotation of a feature's face, nominal")
 FACE_TWIST = variable(
-    "f8 face_twist(feature_face, freedom, contributor)",
+    "f8 face_twist(feature_face, freedom, contributor) [1]",
     "displacement tau [mm], rho [rad] of a feature's face per unit deviation, nominal frame",
-    "1",
 )
-FACE_HEIGHT = variable(
-    "f8 face_height(feature_face, contributor)",
-    "outward offset of a feature's face per unit deviation",
-    "1",
-)
+FACE_HEIGHT = variable("f8 face_height(feature_face, contributor) [1]", "outward offset of a feature's face per unit deviation")
 FACE_OF_MOVING = variable(
     "i4 face_of_moving(pair)", "number of the feature's face that the moving side of a pair is, counted from 0; -1: none"
 )
@@ -60,7 +51,7 @@ FACE_OF_REFERENCE = variable(
     "i4 face_of_reference(pair)", "number of the feature's face that the reference side is, counted from 0; -1: none"
 )
 FACING = variable(
-    "f8 facing(point)", "-n^m . n^r: share of the moving face's outward offset that closes the gap at a contact point", "1"
+    "f8 facing(point) [1]", "-n^m . n^r: share of the moving face's outward offset that closes the gap at a contact point"
 )
 FEATURE_FACES = (
     FEATURE_OF_FACE, FACE_CENTRE, FREEDOM_LABEL, FACE_TWIST, FACE_HEIGHT, FACE_OF_MOVING, FACE_OF_REFERENCE, FACING,
@@ -80,16 +71,14 @@ TANGENT_RESIDUAL = variable(
     "offset and tilts of the face from the least-squares datum per unit deviation",
 )
 TANGENT_FREE = variable(
-    "f8 tangent_free(tangent, plane_coordinate, tangent_freedom)",
-    "possible offsets and tilts of the plane; 0: no more",
-    "1",
+    "f8 tangent_free(tangent, plane_coordinate, tangent_freedom) [1]", "possible offsets and tilts of the plane; 0: no more"
 )
 FACE_OF_TANGENT_PLACE = variable(
     "i4 face_of_tangent_place(tangent_place)", "number of the feature's face that a place is on, counted from 0"
 )
-TANGENT_PLACE_AT = variable("f8 tangent_place_at(tangent_place, axis)", "place that a plane may touch, nominal", "mm")
+TANGENT_PLACE_AT = variable("f8 tangent_place_at(tangent_place, axis) [mm]", "place that a plane may touch, nominal")
 TANGENT_HEIGHT = variable(
-    "f8 tangent_height(tangent_place, plane_coordinate)", "height of a plane at the place, for an offset or a tilt of 1 mm", "1"
+    "f8 tangent_height(tangent_place, plane_coordinate) [1]", "height of a plane at the place, for an offset or a tilt of 1 mm"
 )
 TANGENTS = (
     TANGENT_FACE, TANGENT_CONTRIBUTOR, TANGENT_RESIDUAL, TANGENT_FREE, FACE_OF_TANGENT_PLACE, TANGENT_PLACE_AT, TANGENT_HEIGHT,
@@ -100,35 +89,33 @@ FORM_COVARIANCE = variable(
     "str form_covariance(feature_face)", "covariance of the form of a feature's face, by distance; empty: it keeps its shape"
 )
 FORM_LENGTH = variable(
-    "f8 form_length(feature_face)", "correlation length of the form, across the axis of a surface with one; NaN: none", "mm"
+    "f8 form_length(feature_face) [mm]", "correlation length of the form, across the axis of a surface with one; NaN: none"
 )
 FORM_LENGTH_ALONG = variable(
-    "f8 form_length_along(feature_face)", "correlation length of the form along the axis of its surface; NaN: none", "mm"
+    "f8 form_length_along(feature_face) [mm]", "correlation length of the form along the axis of its surface; NaN: none"
 )
 FORM_LOBES = variable(
-    "i4 form_lobes(feature_face)", "number of lobes around the axis that all of the form has; 0: any number", "1"
+    "i4 form_lobes(feature_face) [1]", "number of lobes around the axis that all of the form has; 0: any number"
 )
 FORM_ASSOCIATED = variable(
     "str form_associated(feature_face)",
     'what the form is measured from: the "surface", the "circles" of sections across its axis, or its "lines"; empty: none',
 )
 FORM_START, FORM_END = (
-    variable(f"f8 form_{end}(feature_face)", f"place along the axis at the {end} of the face; NaN: no form", "mm")
+    variable(f"f8 form_{end}(feature_face) [mm]", f"place along the axis at the {end} of the face; NaN: no form")
     for end in ("start", "end")
 )
 FORM_SURFACE = surface_variables("form_surface", FEATURE_FACE, "the surface of a face with form, nominal")
 FORM_SPREAD = variable(
-    "f8 form_spread(feature_face)",
+    "f8 form_spread(feature_face) [mm]",
     "standard deviation of the coefficients of the form's modes; NaN: none, or one for each, as measured",
-    "mm",
 )
 FORM_LEFT_OUT = variable(
-    "f8 form_left_out(feature_face)",
+    "f8 form_left_out(feature_face) [1]",
     "share of the variance of the form that the modes leave out, or of the mean square of measured forms; NaN: none",
-    "1",
 )
 FORM_MEAN_ZONE = variable(
-    "f8 form_mean_zone(feature_face)", "mean width of the minimum zones of faces with this form; NaN: none", "mm"
+    "f8 form_mean_zone(feature_face) [mm]", "mean width of the minimum zones of faces with this form; NaN: none"
 )
 FORM_CONTRIBUTOR = variable(
     "i4 form_contributor(feature_face, form_mode)",
@@ -137,17 +124,45 @@ FORM_CONTRIBUTOR = variable(
 FACE_OF_FORM_STATION = variable(
     "i4 face_of_station(form_station)", "number of the feature's face whose form a station is of, counted from 0"
 )
-FORM_STATION_PLACE = variable("f8 station(form_station, axis)", "point of the covariance, nominal", "mm")
+FORM_STATION_PLACE = variable("f8 station(form_station, axis) [mm]", "point of the covariance, nominal")
 FORM_STATION_WEIGHT = variable(
-    "f8 station_weight(form_station, form_mode)", "factor of the covariance with a station in the height of a mode", "1"
+    "f8 station_weight(form_station, form_mode) [1]", "factor of the covariance with a station in the height of a mode"
 )
 FORM_REMOVED = variable(
-    "f8 form_removed(feature_face, form_mode, form_term)",
+    "f8 form_removed(feature_face, form_mode, form_term) [1]",
     "growth, translation, and rotation [mm-1] about the origin, of the face as a whole, which is subtracted from a mode",
-    "1",
 )
 FORMS = (
     FORM_COVARIANCE, FORM_LENGTH, FORM_LENGTH_ALONG, FORM_LOBES, FORM_ASSOCIATED, FORM_START, FORM_END,
     *FORM_SURFACE.values(), FORM_SPREAD, FORM_LEFT_OUT, FORM_MEAN_ZONE, FORM_CONTRIBUTOR, FACE_OF_FORM_STATION,
     FORM_STATION_PLACE, FORM_STATION_WEIGHT, FORM_REMOVED,
 )  # fmt: skip
+
+
+ELASTIC_GROUP, LOADS, WELD_ROWS, ELASTIC_PART = "elastic", "load", "weld_row", "elastic_part"
+
+ELASTIC_PARTS = "elastic_parts"  # attribute of archives and summaries: elastic parts, and the source of their stiffness
+
+LOAD = variable(
+    f"f8 reaction_at_load(realization, {LOADS}) [N]",
+    "reaction at a contact point or two-sided locator of an elastic part; negative: the locator pulls",
+)
+WELD_GAP = variable(f"f8 weld_gap(realization, {WELD_ROWS}) [mm]", "gap that a weld keeps in all later stations")
+WELD_OF_LOAD = variable(f"i4 weld_of_load({LOADS}) [1]", "number of the weld row whose gap a load keeps; -1: none")
+POINT_OF_LOAD = variable(f"i4 point_of_load({LOADS})", "number of the contact point that a load acts at, counted from 0")
+HOLDS = variable(f"i1 holds({LOADS}) [1]", "1: a two-sided locator, whose gap is zero; 0: contact, which only pushes")
+FLEXIBILITY = variable(
+    f"f8 flexibility({LOADS}, load_) [mm N-1]", "opening of a gap by the unit of each load, of elastic parts and springs"
+)
+OPENING = variable(f"f8 opening({LOADS}) [mm]", "opening of the gap at a load by the constant forces, weights among them")
+MEASURED_BY_LOAD = variable(
+    f"f8 measured_by_load(measure, {LOADS}) [mm N-1]", "elastic change of a measure by the unit of a load, at nominal poses"
+)
+MEASURED_BY_FORCES = variable(
+    "f8 measured_by_forces(measure) [mm]", "elastic change of a measure by the constant forces, at nominal poses"
+)
+ELASTIC_LABEL = label(ELASTIC_PART, "elastic part")
+ELASTIC_SOURCE = variable(f"str elastic_source({ELASTIC_PART})", "where the stiffness of an elastic part comes from")
+ELASTIC_HASH = variable(f"str elastic_hash({ELASTIC_PART})", "SHA-256 of its files, or of its mesh and material")
+OF_ELASTIC = (POINT_OF_LOAD, WELD_OF_LOAD, HOLDS, FLEXIBILITY, OPENING, MEASURED_BY_LOAD, MEASURED_BY_FORCES)
+ELASTIC_ROWS = (LOAD, WELD_GAP)

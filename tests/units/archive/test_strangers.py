@@ -14,9 +14,9 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import FIXED, nightly
 from tolcontact.archive.settings import declaration
+from tolcontact.declaration.codec import EntryError, Place, Sources
 from tolcontact.declaration.document import from_document
 from tolcontact.declaration.measure import BINARY, UNARY, tape_of
-from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.mechanics import measures as recording
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from tolcontact.declaration.tolerance_class import GRADES, LETTERS, ToleranceClass, UndefinedClass, tolerance_class
+from tolcontact.declaration.written_tolerance import GRADES, LETTERS, TextFault, ToleranceClass, tolerance_class
 
 # Limit deviations [um] of ISO 286-2, as tables of bearings, dowel pins and machine elements print them: lower, upper.
 PUBLISHED = {
@@ -54,7 +54,7 @@ def test_a_hole_makes_the_fit_that_the_shaft_of_its_letter_makes(letter):
             hole, shaft = ToleranceClass(letter.upper(), str(grade)), ToleranceClass(letter, str(grade - 1))
             try:
                 own, mirrored = hole.deviations(nominal), shaft.deviations(nominal)
-            except UndefinedClass:
+            except TextFault:
                 continue
             basic_hole = ToleranceClass("H", str(grade)).deviations(nominal)
             basic_shaft = ToleranceClass("h", str(grade - 1)).deviations(nominal)
@@ -109,7 +109,7 @@ def test_zones_have_the_width_of_their_grade_and_grow_with_it(letters):
         for grade in GRADES:
             try:
                 lower, upper = ToleranceClass(letters, grade).deviations(nominal)
-            except UndefinedClass:
+            except TextFault:
                 continue
             width = ToleranceClass("H", grade).deviations(nominal)[1]
             assert upper - lower == pytest.approx(width, abs=1e-9)
@@ -131,7 +131,7 @@ UNDEFINED = {
 @pytest.mark.parametrize("designation", UNDEFINED)
 def test_what_the_standard_does_not_define_is_refused(designation):
     nominal, text = designation.split()
-    with pytest.raises(UndefinedClass) as refusal:
+    with pytest.raises(TextFault) as refusal:
         tolerance_class(text).deviations(float(nominal))
     assert UNDEFINED[designation] in str(refusal.value)
 
