@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 from trimesh import triangles
 
 from tolcontact.arrays import Array, Float
-from tolcontact.geometry.opposite import opposite
+from tolcontact.geometry.overlap import opposite
 from tolcontact.geometry.spreading import face_frame
 from tolcontact.geometry.surface import Surface
 

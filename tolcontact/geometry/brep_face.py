@@ -9,8 +9,16 @@ import trimesh
 
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
-from tolcontact.geometry.face_groups import MARGIN, FaceOnSurface, hollow_cylinders, interruptions, patterns, slots
-from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
+from tolcontact.geometry.face_groups import (
+    GENERAL,
+    MARGIN,
+    FaceInFile,
+    FaceOnSurface,
+    hollow_cylinders,
+    interruptions,
+    patterns,
+    slots,
+)
 from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.files.step_shapes import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface

@@ -13,7 +13,7 @@ from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.brep_face import analytic_surfaces, describe_faces, faces_at, number_faces
-from tolcontact.geometry.face_in_file import FaceInFile, group_lines
+from tolcontact.geometry.face_groups import FaceInFile, group_lines
 from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.shapes import placement_of
 from tolcontact.geometry.surface import Surface

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
-from tolcontact.geometry.choice_kernel import choose, drop_beyond_ridges, is_near, keep_shallowest, least
+from tolcontact.geometry.choice_kernel import choose, drop_beyond_ridges, drop_passed, is_near, keep_shallowest, least
 from tolcontact.geometry.kernel import (
     CORNER_ON_FACET,
     EDGE_ON_EDGE,
@@ -20,7 +20,6 @@ from tolcontact.geometry.kernel import (
     edge_on_edge,
     facet_on_corner,
 )
-from tolcontact.geometry.passed_kernel import drop_passed
 from tolcontact.geometry.vector_kernel import (
     cross,
     dot,

@@ -14,8 +14,7 @@ from tolcontact.geometry.brep_face import (
     faces_on_surfaces,
     plain_vector,
 )
-from tolcontact.geometry.face_groups import FaceOnSurface
-from tolcontact.geometry.face_in_file import FaceInFile
+from tolcontact.geometry.face_groups import FaceInFile, FaceOnSurface
 from tolcontact.geometry.files import FROM_PRODUCT, STATED_FACES, Shape
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
 from tolcontact.pmi.declarable import Undeclared

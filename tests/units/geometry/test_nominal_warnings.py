@@ -7,7 +7,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tests.helpers import nightly
-from tolcontact.geometry.body_overlap import SolidBody, common_ball
+from tolcontact.geometry.nearest_elements import SolidBody, common_ball
 
 
 @pytest.mark.parametrize("seed", [1, *nightly(2, 3, 4)])

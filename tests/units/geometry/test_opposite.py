@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tests.cases.blocks import combs
-from tolcontact.geometry.opposite import opposite
+from tolcontact.geometry.overlap import opposite
 from tolcontact.geometry.surface import Surface
 
 TURN, SHIFT = Rotation.from_rotvec((0.4, -1.1, 0.7)).as_matrix(), np.array((31.0, -17.0, 90.0))

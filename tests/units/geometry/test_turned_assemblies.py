@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tests.test_turned_assemblies import SHIFT, TURNS, moments, polygon_moments
-from tolcontact.geometry.opposite import opposite
+from tolcontact.geometry.overlap import opposite
 from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.surface import Surface
 
