@@ -1,7 +1,5 @@
 """Candidate contact points of two bodies: planes that face each other, their outlines and holes, and the order of a search."""
 
-from typing import NamedTuple
-
 import numpy as np
 import trimesh
 
@@ -19,21 +17,6 @@ ROUNDING = 1e-9  # bands: segments that end this close to a band are in it
 MAX_COMPARISONS = 1_000_000  # of segments of two loops: finer ones count as if they met
 FACING = -0.99  # cosine of the angle between the normals of planes that face each other
 STRAIGHT = 1e-6  # rad: a larger interior angle than a straight one is reflex
-
-
-class Sorted(NamedTuple):
-    """Runs of intervals: in each run first the wide intervals, then the narrow ones in ascending order of their start.
-
-    order     (n,): indices of the intervals
-    runs      (run + 1,): where runs begin, and the end
-    middles   (run,): where their narrow intervals begin
-    widths    (run,): largest width of a narrow interval
-    """
-
-    order: Int[Array, " n"]
-    runs: Int[Array, " _"]
-    middles: Int[Array, " run"]
-    widths: Float[Array, " run"]
 
 
 def sorted_candidates(
@@ -56,9 +39,9 @@ def sorted_candidates(
                 [coordinates.min(axis=1), coordinates.max(axis=1)], axis=1
             )
     owners = np.where(kinds == FACET_ON_CORNER, seconds, firsts)
-    by_owner = _sorted(boxes[:, 0], boxes[:, 2], np.stack([kinds, owners, planes]))
-    kinds, firsts, seconds, planes = (np.ascontiguousarray(column) for column in table[by_owner.order].T)
-    leaders = by_owner.runs[:-1]
+    order, runs, middles, widths = _sorted(boxes[:, 0], boxes[:, 2], np.stack([kinds, owners, planes]))
+    kinds, firsts, seconds, planes = (np.ascontiguousarray(column) for column in table[order].T)
+    leaders = runs[:-1]
     is_edge = (kinds[leaders] == EDGE_ON_EDGE) & (planes[leaders] >= 0) & (not has_form)
     clearances = np.zeros(len(leaders))
     clearances[is_edge] = hole_clearances(A, B, facing, in_space)[firsts[leaders[is_edge]], planes[leaders[is_edge]]]
@@ -72,14 +55,14 @@ def sorted_candidates(
     centre = A.facets.mean(axis=(0, 1))
     ball = np.append(centre, np.linalg.norm(A.vertices - centre, axis=1).max(initial=0.0))
     return Candidates(
-        kinds, firsts, seconds, planes, ridges, facing, *by_owner[1:], CLEARANCE_SHARE * clearances, ball,
-        boxes[by_owner.order], frames, *_in_bands(outlines),
+        kinds, firsts, seconds, planes, ridges, facing, runs, middles, widths, CLEARANCE_SHARE * clearances, ball,
+        boxes[order], frames, *_in_bands(outlines),
     )  # fmt: skip
 
 
 def _planes_beyond(body: Polyhedron, planes: Int[Array, " p"]) -> Int[Array, " _"]:
     """Return for each plane of a body the index in `planes` of one beyond a convex edge, -1 for none."""
-    beyond = np.full(int(max(body.facet_planes.max(initial=0), body.edge_planes.max(initial=0))) + 1, -1)
+    beyond = np.full(_plane_count(body), -1)
     ends = body.edge_planes[body.convex.astype(bool) & (body.edge_planes >= 0).all(axis=1)]
     for sides in (ends, ends[:, ::-1]):
         for k, plane in enumerate(planes):
@@ -103,10 +86,14 @@ def _in_bands(outlines: list[Float[Array, "segment 2 2"]]) -> tuple[np.ndarray, 
     return np.concatenate(rows), np.array(bands), np.array(numbers), spans
 
 
-def _sorted(lows: Float[Array, " n"], highs: Float[Array, " n"], keys: Int[Array, "key n"]) -> Sorted:
-    """Return intervals in runs of equal keys; the first key is the most significant."""
+def _sorted(lows: Float[Array, " n"], highs: Float[Array, " n"], keys: Int[Array, "key n"]) -> tuple[np.ndarray, ...]:
+    """Return intervals in runs of equal keys: first the wide ones, then the narrow ones in ascending order of their start.
+
+    The first key is the most significant. The results are the order (n,) of the intervals, where runs begin and the end
+    (run + 1,), where their narrow intervals begin (run,), and the largest width of a narrow interval (run,).
+    """
     if not len(lows):
-        return Sorted(*(np.zeros(0, dtype=int), np.zeros(1, dtype=int)), np.zeros(0, dtype=int), np.zeros(0))
+        return np.zeros(0, dtype=int), np.zeros(1, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
     codes = np.zeros(len(lows), dtype=np.int64)
     for key in keys:
         codes = codes * (np.ptp(key) + 1) + key - key.min()
@@ -122,7 +109,7 @@ def _sorted(lows: Float[Array, " n"], highs: Float[Array, " n"], keys: Int[Array
     np.maximum.at(narrowest, run[~is_wide], widths[~is_wide])
     lengths, wide = np.bincount(run, minlength=count), np.bincount(run[is_wide], minlength=count)
     runs = np.concatenate([[0], np.cumsum(lengths)])
-    return Sorted(np.lexsort((lows, ~is_wide, run)), runs, runs[:-1] + wide, narrowest)
+    return np.lexsort((lows, ~is_wide, run)), runs, runs[:-1] + wide, narrowest
 
 
 def outline(body: Polyhedron, facet: int) -> Float[Array, "segment 2 3"]:

@@ -10,8 +10,8 @@ All is in the part's own frame, lengths in mm.
 
 import itertools
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
@@ -20,7 +20,7 @@ from tolcontact.declaration.selection import FACE_GROUPS
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, axes_across, azimuths
 from tolcontact.geometry.nearest_elements import SolidBody
-from tolcontact.geometry.tolerances import RESIDUALS, SAME_PLACE, SQUARE
+from tolcontact.geometry.tolerances import RESIDUALS, ROUNDING, SAME_PLACE, SQUARE
 from tolcontact.readable import Readable
 from tolcontact.texts import shown_name
 
@@ -32,7 +32,6 @@ DIRECTIONS = 360  # samples around the axis
 CHORD_FACTOR = 2.0  # times the height of the surface over its triangles
 
 FaceOnSurface = tuple[AnalyticSurface | None, np.ndarray]  # a surface, if one is known, and the triangles (face,) on it
-SameSurface = Callable[[FaceOnSurface, FaceOnSurface], bool]
 Group = tuple[int, ...]
 
 
@@ -107,18 +106,78 @@ def _title(word: str, group: tuple[int, ...], faces: Sequence[FaceInFile]) -> st
     radius = next(face.radius for face in members if face.radius is not None)
     if word == "slot":
         return f"slot, radius {radius:.6g} mm, faces {', '.join(map(str, group))}"
-    holes = list(dict.fromkeys(face.whole or (face.number,) for face in members))
+    holes = list(dict.fromkeys(map(_whole, members)))
     listed = "; ".join(" and ".join(map(str, hole)) for hole in holes)
     return f"pattern of {len(holes)} holes, radius {radius:.6g} mm, faces {listed}"
 
 
-def interruptions(
-    mesh: trimesh.Trimesh, faces: Sequence[FaceOnSurface], label: np.ndarray, is_same: SameSurface
-) -> Iterator[tuple[int, int]]:
+def grouped(
+    mesh: trimesh.Trimesh, face_of: np.ndarray, faces: Sequence[FaceInFile], surfaces: Sequence[FaceOnSurface]
+) -> list[FaceInFile]:
+    """Return the descriptions of B-rep faces with their whole surfaces, slots and patterns.
+
+    `face_of` (triangle,) is the index of each triangle's face.
+    """
+    neighbours = face_of[np.asarray(mesh.face_adjacency).reshape(-1, 2)]
+    touching = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
+    wholes = _wholes(mesh, touching, surfaces)
+    faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
+    cylinders = {
+        _whole(face): surface
+        for face, (surface, triangles) in zip(faces, surfaces, strict=True)
+        if isinstance(surface, Cylinder) and face.is_inner and len(triangles)
+    }
+    margin = MARGIN * float(mesh.scale)
+    slot_of = {number: slot for slot in _slots(faces, cylinders, touching, margin) for number in slot}
+    pattern_of = {number: pattern for pattern in _patterns(mesh, cylinders, surfaces, margin) for number in pattern}
+    return [replace(face, slot=slot_of.get(face.number, ()), pattern=pattern_of.get(face.number, ())) for face in faces]
+
+
+def _wholes(mesh: trimesh.Trimesh, touching: np.ndarray, faces: Sequence[FaceOnSurface]) -> Iterator[tuple[int, ...]]:
+    """Yield for each B-rep face the face numbers of its whole surface; none if it is the only face of its surface.
+
+    Such faces touch, as listed in `touching` (pair, 2), or belong to an interrupted cylinder or cone.
+    """
+    links = [pair for pair in touching if are_one_surface(mesh, *(faces[number] for number in pair))]
+    label = _components(links, len(faces))
+    links += _interruptions(mesh, faces, label)
+    label = _components(links, len(faces))
+    for number in label:
+        members = tuple(int(member) + 1 for member in np.flatnonzero(label == number))
+        yield members if len(members) > 1 else ()
+
+
+def _components(links: Sequence[Sequence[int]], count: int) -> np.ndarray:
+    """Return the connected component (node,) of each of `count` nodes that pairs in `links` join."""
+    return np.asarray(
+        trimesh.graph.connected_component_labels(np.array(links, dtype=np.int64).reshape(-1, 2), node_count=count)
+    )
+
+
+def are_one_surface(mesh: trimesh.Trimesh, face: FaceOnSurface, neighbour: FaceOnSurface) -> bool:
+    """Return whether two faces are parts of one surface, with their outside on the same side of it."""
+    (surface, triangles), (next_surface, next_triangles) = face, neighbour
+    if surface is None or next_surface is None or surface.kind != next_surface.kind:
+        return False
+    if surface.is_fitted != next_surface.is_fitted:
+        return False
+    if _is_outside(mesh, surface, triangles) != _is_outside(mesh, surface, next_triangles):
+        return False
+    vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[next_triangles])]
+    distance = float(np.abs(surface.distance(vertices)[0]).max())
+    return distance <= RESIDUALS * (surface.residual + next_surface.residual) + ROUNDING * float(mesh.scale)
+
+
+def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.ndarray) -> bool:
+    """Return whether triangles (face,) have their outside on the outside of the surface."""
+    _, slope = surface.distance(np.asarray(mesh.triangles_center)[triangles])
+    return bool((slope * np.asarray(mesh.face_normals)[triangles]).sum() > 0)
+
+
+def _interruptions(mesh: trimesh.Trimesh, faces: Sequence[FaceOnSurface], label: np.ndarray) -> Iterator[tuple[int, int]]:
     """Yield pairs of indices of faces that form one interrupted cylinder or cone.
 
-    label     (face,) equal for faces that touch and already form one surface
-    is_same   whether two faces are parts of one surface
+    `label` (face,) is equal for faces that touch and already form one surface.
     """
     firsts = [int(number) for number in np.unique(label, return_index=True)[1]]
     candidates = [(number, faces[number][0]) for number in firsts if len(faces[number][1])]
@@ -126,7 +185,7 @@ def interruptions(
     body = SolidBody(mesh)
     margin = SAME_PLACE * float(mesh.scale)
     for (first, surface), (second, neighbour) in itertools.combinations(round_faces, 2):
-        if _may_be_one(surface, neighbour, margin) and is_same(faces[first], faces[second]) and body.is_closed:
+        if _may_be_one(surface, neighbour, margin) and are_one_surface(mesh, faces[first], faces[second]) and body.is_closed:
             parts = [
                 np.concatenate([faces[int(member)][1] for member in np.flatnonzero(label == label[number])])
                 for number in (first, second)
@@ -158,19 +217,12 @@ def _is_interrupted(body: SolidBody, surface: Cylinder | Cone, parts: Sequence[n
         [(points.reshape(-1, 3, 3) + np.roll(points.reshape(-1, 3, 3), 1, axis=1)) / 2 for points in corners]
     )
     chord = float(np.abs(surface.distance(middles.reshape(-1, 3))[0]).max())
-    return bool((body.depth(circle) < CHORD_FACTOR * chord + margin).all())
+    return bool((body.depth_inside(circle) < CHORD_FACTOR * chord + margin).all())
 
 
-def hollow_cylinders(faces: Sequence[FaceInFile], surfaces: Sequence[FaceOnSurface]) -> dict[Group, Cylinder]:
-    """Return the hollow cylinders of a part by their face numbers, from descriptions that include whole surfaces."""
-    return {
-        _whole(face): surface
-        for face, (surface, triangles) in zip(faces, surfaces, strict=True)
-        if isinstance(surface, Cylinder) and face.is_inner and len(triangles)
-    }
-
-
-def slots(faces: Sequence[FaceInFile], cylinders: Mapping[Group, Cylinder], touching: np.ndarray, margin: float) -> list[Group]:
+def _slots(
+    faces: Sequence[FaceInFile], cylinders: Mapping[Group, Cylinder], touching: np.ndarray, margin: float
+) -> list[Group]:
     """Return the face numbers, from 1, of each slot; `touching` (pair, 2) are the indices of faces that share an edge.
 
     Lengths that differ by less than a `margin` [mm] are equal.
@@ -195,7 +247,7 @@ def slots(faces: Sequence[FaceInFile], cylinders: Mapping[Group, Cylinder], touc
     ]
 
 
-def patterns(
+def _patterns(
     mesh: trimesh.Trimesh, cylinders: Mapping[Group, Cylinder], surfaces: Sequence[FaceOnSurface], margin: float
 ) -> list[Group]:
     """Return the face numbers, from 1, of each pattern of at least two holes, whose radii differ by less than a margin [mm]."""

@@ -4,8 +4,6 @@ Rounding tilts the triangles of a plane relative to each other, by the coordinat
 touch as drawn penetrate each other. Planes are made flat again, and all faces move into the material by the error.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 import trimesh
 
@@ -19,20 +17,6 @@ MIN_CROSSING = 1e-3  # smallest singular value of the normals of planes that mee
 ROUNDED = 1e-9  # smaller components of normals are 0
 TINY = 1e-300
 SAME_PLANE = 1e-5  # rad: planes at a smaller angle are one
-
-
-class Planes(NamedTuple):
-    """The planes of a mesh, in pairs of a plane and one of its vertices.
-
-    number, vertex   (pair,) index of the plane, and of the vertex
-    normals          (pair, 3) outward
-    heights          (pair,) [mm] of the plane above the vertex
-    """
-
-    number: Int[Array, " pair"]
-    vertex: Int[Array, " pair"]
-    normals: Float[Array, "pair 3"]
-    heights: Float[Array, " pair"]
 
 
 def smaller(body: trimesh.Trimesh, error: float) -> trimesh.Trimesh:
@@ -51,19 +35,18 @@ def inset(mesh: trimesh.Trimesh, error: float) -> Float[Array, "vertex 3"]:
     first, and the others are fitted as well as possible.
     """
     label = _coplanar(mesh, error)
-    planes = _fitted(mesh, label)
-    curved = np.unique(planes.number[np.abs(planes.heights) > MAX_ERRORS * error])
+    plane, vertices, normals, heights = _fitted(mesh, label)
+    curved = np.unique(plane[np.abs(heights) > MAX_ERRORS * error])
     if curved.size:  # triangles that approximate a curved face, at small angles
         alone = np.flatnonzero(np.isin(label, curved))
         label[alone] = label.max() + 1 + np.arange(len(alone))
         label = np.unique(label, return_inverse=True)[1]
-        planes = _fitted(mesh, label)
-    is_joint = (np.bincount(label) > 1)[planes.number]
-    N, heights, count = planes.normals, planes.heights - error, len(mesh.vertices)
-    vertex, joint = planes.vertex[is_joint], N[is_joint]
-    moved = displacements(vertex, joint, np.column_stack([heights[is_joint], joint]), count, MIN_CROSSING)
+        plane, vertices, normals, heights = _fitted(mesh, label)
+    is_joint, heights, count = (np.bincount(label) > 1)[plane], heights - error, len(mesh.vertices)
+    joint = normals[is_joint]
+    moved = displacements(vertices[is_joint], joint, np.column_stack([heights[is_joint], joint]), count, MIN_CROSSING)
     motions, free = moved[..., 0], np.eye(3) - moved[..., 1:]  # free: projection onto the directions left free by these planes
-    vertex, lone = planes.vertex[~is_joint], N[~is_joint]
+    vertex, lone = vertices[~is_joint], normals[~is_joint]
     remainder = heights[~is_joint] - (lone * motions[vertex]).sum(axis=1)
     lone = (lone[:, None] @ free[vertex])[:, 0]
     lone[np.abs(lone) < ROUNDED] = 0
@@ -81,8 +64,12 @@ def _coplanar(mesh: trimesh.Trimesh, error: float) -> Int[Array, " face"]:
     return np.asarray(trimesh.graph.connected_component_labels(neighbours[is_flat], node_count=len(mesh.faces)), dtype=np.int64)
 
 
-def _fitted(mesh: trimesh.Trimesh, label: np.ndarray) -> Planes:
-    """Return the planes fitted to the vertices of the triangles of each label (face,)."""
+def _fitted(mesh: trimesh.Trimesh, label: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the planes fitted to the vertices of the triangles of each label (face,), in pairs of a plane and a vertex of it.
+
+    The results are the indices of both (pair,), the outward normals (pair, 3), and the heights (pair,) [mm] of the planes above
+    the vertices.
+    """
     number, vertex = np.unique(np.column_stack([label.repeat(3), np.asarray(mesh.faces).ravel()]), axis=0).T
     points, areas = np.asarray(mesh.vertices)[vertex], np.asarray(mesh.area_faces)[:, None] * np.asarray(mesh.face_normals)
     centres = _sums(number, points) / np.bincount(number)[:, None]
@@ -90,7 +77,7 @@ def _fitted(mesh: trimesh.Trimesh, label: np.ndarray) -> Planes:
     moments = _sums(number, (arms[:, :, None] * arms[:, None]).reshape(-1, 9)).reshape(-1, 3, 3)
     normals = np.linalg.eigh(moments)[1][:, :, 0]
     normals *= np.where((normals * _sums(label, areas)).sum(axis=1) < 0, -1.0, 1.0)[:, None]
-    return Planes(number, vertex, normals[number], -(arms * normals[number]).sum(axis=1))
+    return number, vertex, normals[number], -(arms * normals[number]).sum(axis=1)
 
 
 def _sums(group: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from tolcontact.errors import GeometryFault, ModelError, OptionError, nearest_na
 from tolcontact.geometry.brep_face import describe_faces, number_faces, plain_vector
 from tolcontact.geometry.face_groups import GENERAL, FaceInFile
 from tolcontact.geometry.files import BREP, STATED_FACES, key_of, read_files
-from tolcontact.geometry.files.product import MAX_LISTED, Body, Product
+from tolcontact.geometry.files.product import MAX_LISTED, Product
 from tolcontact.geometry.shapes import placement_of, shape
 from tolcontact.geometry.tolerances import SAME_DIRECTION, SAME_PLACE
 from tolcontact.geometry.triangle_mesh import placed_mesh
@@ -68,11 +68,6 @@ def bodies_in(path: str | Path) -> tuple[BodyInFile, ...]:
     Raises OptionError if it cannot be read.
     """
     return _bodies(_listed_product(path))
-
-
-def _bodies(product: Product) -> tuple[BodyInFile, ...]:
-    units = shown(product.units)
-    return tuple(_body(number, body, units) for number, body in enumerate(product.bodies, start=1))
 
 
 def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFile, ...]:
@@ -234,11 +229,15 @@ def _product(path: str | Path, chord: float | None = None) -> Product:
     return content
 
 
-def _body(number: int, body: Body, units: str) -> BodyInFile:
-    lower, upper = map(plain_vector, body.box)
-    rotation = Rotation.from_matrix(body.place[:3, :3]).as_rotvec()
-    place = plain_vector(body.place[:3, 3]), plain_vector(rotation)
-    return BodyInFile(number, body.name, body.path, lower, upper, *place, len(body.shape.faces), body.is_open, units)
+def _bodies(product: Product) -> tuple[BodyInFile, ...]:
+    bodies, units = [], shown(product.units)
+    for number, body in enumerate(product.bodies, start=1):
+        rotation = Rotation.from_matrix(body.place[:3, :3]).as_rotvec()
+        lower, upper, at, turn = map(plain_vector, (*body.box, body.place[:3, 3], rotation))
+        bodies.append(
+            BodyInFile(number, body.name, body.path, lower, upper, at, turn, len(body.shape.faces), body.is_open, units)
+        )
+    return tuple(bodies)
 
 
 class PartPreview(NamedTuple):

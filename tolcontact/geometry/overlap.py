@@ -117,19 +117,13 @@ def points_on_rim(face: Surface, step: float) -> np.ndarray:
     return np.concatenate([np.linspace(a, b, count, endpoint=False) for a, b, count in zip(starts, ends, pieces, strict=True)])
 
 
-class Opposite(NamedTuple):
-    """Triangles (triangle, 3, 3) [mm] of a face, and the cosines (triangle,) of their angles to the face opposite to them."""
-
-    triangles: np.ndarray
-    cosines: np.ndarray
-
-
-def opposite(face: Surface, target: Surface, within: float) -> Opposite | None:
+def opposite(face: Surface, target: Surface, within: float) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the part of a face that is over the target, along its normals, within a distance [mm] in front of it.
 
     A tenth of this distance behind it counts, too, since bodies may penetrate each other nominally. The target must face it
     there. Over several triangles of the target, the nearest one counts. The result is exact for polyhedra and does not depend
-    on their triangles. It is None if too many triangles overlap to cut them all.
+    on their triangles: triangles (triangle, 3, 3) [mm] of the face, and the cosines (triangle,) of their angles to the target.
+    It is None if too many triangles overlap to cut them all.
     """
     corners, normals = np.asarray(face.mesh.triangles), np.asarray(face.mesh.face_normals)
     target_corners, target_normals = np.asarray(target.mesh.triangles), np.asarray(target.mesh.face_normals)
@@ -152,7 +146,7 @@ def opposite(face: Surface, target: Surface, within: float) -> Opposite | None:
         return None
     pieces, pair = nearest
     large = trimesh.triangles.area(pieces) > least
-    return Opposite(pieces[large], cosines[pair[large]])
+    return pieces[large], cosines[pair[large]]
 
 
 class _Pairs(NamedTuple):

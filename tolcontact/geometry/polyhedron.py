@@ -127,20 +127,10 @@ def _planes_around(corners: np.ndarray, faces: np.ndarray, planes: np.ndarray) -
     return table
 
 
-class MergedSurface(NamedTuple):
-    """The triangles of a body that have an area, with merged vertices.
+def merged_surface(body: trimesh.Trimesh) -> tuple[trimesh.Trimesh, Int[Array, " t"], bool]:
+    """Return the triangles of a body that have an area, with merged vertices, and their indices in the body.
 
-    sources    (t,): indices of these triangles in the body
-    is_closed  whether each triangle of the body continues into others along all its edges
-    """
-
-    mesh: trimesh.Trimesh
-    sources: Int[Array, " t"]
-    is_closed: bool
-
-
-def merged_surface(body: trimesh.Trimesh) -> MergedSurface:
-    """Return the triangles of a body that have an area, with merged vertices.
+    The last result is whether each triangle of the body continues into others along all its edges.
 
     Two blocks that touch along an edge, or in a corner, have an edge with four triangles, or a corner with two fans. They are
     closed nevertheless: each triangle continues into the triangle on the other side of its material, and each fan has its own
@@ -159,7 +149,7 @@ def merged_surface(body: trimesh.Trimesh) -> MergedSurface:
         surface, sources = _apart(vertices, faces, twins), proper_faces[divided]
     proper = have_area(surface)
     surface.update_faces(proper)
-    return MergedSurface(surface, sources[proper], twins is not None)
+    return surface, sources[proper], twins is not None
 
 
 def _divided(vertices: np.ndarray, faces: np.ndarray) -> tuple[Int[Array, "d 3"], Int[Array, " d"]]:

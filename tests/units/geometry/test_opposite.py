@@ -20,9 +20,9 @@ def moments(face, target, within, R=None, t=(0, 0, 0)):
     for mesh in bodies:
         if np.linalg.det(A) < 0:
             mesh.invert()
-    part = opposite(*map(Surface, bodies), within)
-    places = ((part.triangles + np.roll(part.triangles, 1, axis=1)).reshape(-1, 3) / 2 - t) @ np.linalg.inv(A).T
-    shares = np.repeat(trimesh.triangles.area(part.triangles) * part.cosines / 3, 3)
+    part, cosines = opposite(*map(Surface, bodies), within)
+    places = ((part + np.roll(part, 1, axis=1)).reshape(-1, 3) / 2 - t) @ np.linalg.inv(A).T
+    shares = np.repeat(trimesh.triangles.area(part) * cosines / 3, 3)
     centre = shares @ places / shares.sum()
     return shares.sum(), centre, (places - centre).T @ ((places - centre) * shares[:, None]) / shares.sum()
 
