@@ -22,7 +22,7 @@ from tolcontact.cli.output import console
 from tolcontact.cli.progress import waiting
 from tolcontact.errors import OptionError
 from tolcontact.geometry import bodies_in, faces_in, group_lines
-from tolcontact.geometry.step_listing import FacesOfRecords
+from tolcontact.geometry.listing import FacesOfRecords
 from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
 from tolcontact.pmi.claims import Annotation
 from tolcontact.pmi.declared import DeclaredFile, declared_file

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 from trimesh import triangles
 
 from tolcontact.arrays import Array, Float
-from tolcontact.geometry.opposite import opposite
+from tolcontact.geometry.overlap import opposite
 from tolcontact.geometry.spreading import face_frame
 from tolcontact.geometry.surface import Surface
 
@@ -126,9 +126,10 @@ class _Elements(NamedTuple):
 def _exact_elements(face: Surface, target: Surface, within: float) -> _Elements | None:
     """Return the triangles that are opposite to a target; None if there are none, or too many."""
     region = opposite(face, target, within)
-    if region is None or not len(region.triangles):
+    if region is None or not len(region[0]):
         return None
-    return _Elements(region.triangles, triangles.area(region.triangles) * region.cosines, 0.0)
+    corners, cosines = region
+    return _Elements(corners, triangles.area(corners) * cosines, 0.0)
 
 
 def _elements(count: int, distance: float, face: Surface, target: Surface, *, by_cosines: bool = False) -> _Elements | None:
@@ -151,7 +152,7 @@ def _region(elements: _Elements, face: Surface) -> CountedRegion:
     # The midpoints of the edges of triangles integrate quadratic functions exactly.
     places = (elements.corners + np.roll(elements.corners, 1, axis=1)).reshape(-1, 3) / 2
     if face.surfaces:
-        places, _ = face.projections(places)
+        places = face.project(places)[0]
     return CountedRegion(places, np.repeat(elements.areas / 3, 3))
 
 

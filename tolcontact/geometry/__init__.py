@@ -5,9 +5,8 @@
 
 from tolcontact.geometry.analytic_surfaces import surface_arrays, surfaces_of
 from tolcontact.geometry.brep_face import known_surfaces, with_known_surfaces
-from tolcontact.geometry.face_in_file import FaceInFile, group_lines
-from tolcontact.geometry.part_preview import PartPreview, preview
-from tolcontact.geometry.step_listing import BodyInFile, bodies_in, faces_in, parts_from
+from tolcontact.geometry.face_groups import FaceInFile, group_lines
+from tolcontact.geometry.listing import BodyInFile, PartPreview, bodies_in, faces_in, parts_from, preview
 
 __all__ = [
     "BodyInFile",

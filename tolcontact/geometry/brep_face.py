@@ -1,20 +1,17 @@
 """Faces of a part, B-rep faces of a STEP file or smooth pieces of a mesh: their surfaces and descriptions. Lengths in mm."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Sequence
 
 import numpy as np
 import trimesh
 
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
-from tolcontact.geometry.face_groups import MARGIN, FaceOnSurface, hollow_cylinders, interruptions, patterns, slots
-from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
+from tolcontact.geometry.face_groups import GENERAL, FaceInFile, FaceOnSurface, are_one_surface, grouped
 from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.files.step_shapes import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
-from tolcontact.geometry.tolerances import RESIDUALS, ROUNDING
+from tolcontact.geometry.tolerances import ROUNDING
 from tolcontact.geometry.triangle_mesh import smooth_pieces
 
 FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from its surface
@@ -39,13 +36,15 @@ def number_faces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[StatedFace
 def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
     """Return the faces of a part. Its mesh caches them, since fitting surfaces takes time."""
     if DESCRIPTIONS not in mesh.metadata:
-        _, stated_faces = number_faces(mesh)
+        face_of, stated_faces = number_faces(mesh)
         on_surfaces = faces_on_surfaces(mesh)
         faces = [
             _description(number, surface, stated, stated.measure or _measure(mesh, triangles, surface))
             for number, (stated, (surface, triangles)) in enumerate(zip(stated_faces, on_surfaces, strict=True), start=1)
         ]
-        mesh.metadata[DESCRIPTIONS] = tuple(_grouped(mesh, faces, on_surfaces) if BREP in mesh.face_attributes else faces)
+        mesh.metadata[DESCRIPTIONS] = tuple(
+            grouped(mesh, face_of, faces, on_surfaces) if BREP in mesh.face_attributes else faces
+        )
     return mesh.metadata[DESCRIPTIONS]  # type: ignore[no-any-return]
 
 
@@ -71,60 +70,6 @@ def faces_at(mesh: trimesh.Trimesh, point: Vector) -> tuple[list[int], float]:
     distances = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, copies) - copies, axis=1)
     nearest = np.unique(face_of[distances < distances.min() + ROUNDING * mesh.scale])
     return [int(number) + 1 for number in nearest], float(distances.min())
-
-
-def _grouped(mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Sequence[FaceOnSurface]) -> list[FaceInFile]:
-    """Return the descriptions of B-rep faces with their whole surfaces, slots and patterns."""
-    face_of, _ = number_faces(mesh)
-    neighbours = face_of[np.asarray(mesh.face_adjacency).reshape(-1, 2)]
-    touching = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
-    wholes = _wholes(mesh, touching, surfaces)
-    faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
-    cylinders, margin = hollow_cylinders(faces, surfaces), MARGIN * float(mesh.scale)
-    slot_of = {number: slot for slot in slots(faces, cylinders, touching, margin) for number in slot}
-    pattern_of = {number: pattern for pattern in patterns(mesh, cylinders, surfaces, margin) for number in pattern}
-    return [replace(face, slot=slot_of.get(face.number, ()), pattern=pattern_of.get(face.number, ())) for face in faces]
-
-
-def _wholes(mesh: trimesh.Trimesh, touching: np.ndarray, faces: Sequence[FaceOnSurface]) -> Iterator[tuple[int, ...]]:
-    """Yield for each B-rep face the face numbers of its whole surface; none if it is the only face of its surface.
-
-    Such faces touch, as listed in `touching` (pair, 2), or belong to an interrupted cylinder or cone.
-    """
-    links = [pair for pair in touching if are_one_surface(mesh, *(faces[number] for number in pair))]
-    label = _components(links, len(faces))
-    links += interruptions(mesh, faces, label, partial(are_one_surface, mesh))
-    label = _components(links, len(faces))
-    for number in label:
-        members = tuple(int(member) + 1 for member in np.flatnonzero(label == number))
-        yield members if len(members) > 1 else ()
-
-
-def _components(links: Sequence[Sequence[int]], count: int) -> np.ndarray:
-    """Return the connected component (node,) of each of `count` nodes that pairs in `links` join."""
-    return np.asarray(
-        trimesh.graph.connected_component_labels(np.array(links, dtype=np.int64).reshape(-1, 2), node_count=count)
-    )
-
-
-def are_one_surface(mesh: trimesh.Trimesh, face: FaceOnSurface, neighbour: FaceOnSurface) -> bool:
-    """Return whether two faces are parts of one surface, with their outside on the same side of it."""
-    (surface, triangles), (next_surface, next_triangles) = face, neighbour
-    if surface is None or next_surface is None or surface.kind != next_surface.kind:
-        return False
-    if surface.is_fitted != next_surface.is_fitted:
-        return False
-    if _is_outside(mesh, surface, triangles) != _is_outside(mesh, surface, next_triangles):
-        return False
-    vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[next_triangles])]
-    distance = float(np.abs(surface.distance(vertices)[0]).max())
-    return distance <= RESIDUALS * (surface.residual + next_surface.residual) + ROUNDING * float(mesh.scale)
-
-
-def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.ndarray) -> bool:
-    """Return whether triangles (face,) have their outside on the outside of the surface."""
-    _, slope = surface.distance(np.asarray(mesh.triangles_center)[triangles])
-    return bool((slope * np.asarray(mesh.face_normals)[triangles]).sum() > 0)
 
 
 def _measure(mesh: trimesh.Trimesh, triangles: np.ndarray, surface: AnalyticSurface | None) -> FaceMeasure:

@@ -8,15 +8,16 @@ The form deviation of a plane counts along its own normal, never along the norma
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any
 
 import igl
 import numpy as np
 import trimesh
 
 from tolcontact import poses as pose
+from tolcontact.geometry.nearest_elements import SolidBody
 from tolcontact.geometry.spreading import unique_points
-from tolcontact.geometry.surface import Piece, Surface
+from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.triangle_mesh import rim, subdivided
 from tolcontact.vocabulary import ROUNDED
 
@@ -36,12 +37,14 @@ class BodyFace:
 
     points   (point, 3) [mm], spread over the whole face, including its corners
     normals  (point, 3): outward normals there
+    plane    normal and height of the bounding plane of a flat face; None if the face is not flat
     """
 
     face: Surface
-    body: trimesh.Trimesh
+    body: SolidBody
     points: np.ndarray
     normals: np.ndarray
+    plane: tuple[np.ndarray, float] | None
 
     def raise_to_depths(self, largest: np.ndarray, row: np.ndarray, points: np.ndarray) -> None:
         """Raise depths `largest` (row,) [mm] to the depths of `points` (point, 3) [mm] that belong to rows `row` (point,).
@@ -49,13 +52,13 @@ class BodyFace:
         The depth of a point behind the face and inside the body is its distance to the face; elsewhere it is 0. If the body is
         not closed, everything behind the face counts as inside.
         """
-        lower, upper = self.body.bounds
+        lower, upper = self.body.mesh.bounds
         inside = np.flatnonzero(((points >= lower) & (points <= upper)).all(axis=1))
         row, points = row[inside], points[inside]
         depth, behind = np.zeros(len(points)), self._is_behind(points)
         if behind.any():
             depth[behind] = self.face.depth(points[behind])
-        if not self._is_closed:
+        if not self.body.is_closed:
             np.maximum.at(largest, row, depth)
             return
         is_certain = depth <= max(self._bulge, ROUNDED)  # points that only touch count as inside
@@ -67,7 +70,7 @@ class BodyFace:
             starts = np.flatnonzero(np.diff(row[order], prepend=-1))
             is_next = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order))) < count
             chosen = order[is_next]
-            turns = igl.winding_number(self._vertices, self._faces, np.ascontiguousarray(points[chosen]))
+            turns = igl.winding_number(self.body.vertices, self.body.faces, np.ascontiguousarray(points[chosen]))
             hits = chosen[turns > 0.5]
             np.maximum.at(largest, row[hits], depth[hits])
             order, count = order[~is_next], MORE_POINTS * count
@@ -96,12 +99,12 @@ class BodyFace:
 
     def _behind_round(self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rows and indices as `behind` does, for a face that is not flat."""
-        if len(self._unknown.mesh.faces):
+        if len(self.face.unknown.mesh.faces):
             row, point = np.indices((len(motion), len(other.points)))
             return row.ravel(), point.ravel()
         R, t = pose.rotation(motion), pose.translation(motion)
         is_near = np.zeros((len(motion), len(other.points)), dtype=bool)
-        for surface, is_hollow, _ in self._pieces:
+        for surface, is_hollow, _ in self.face.pieces:
             along, *across = np.linalg.svd(surface.axis[None])[2]
             axes = np.array([*across, along if along @ surface.axis > 0 else -along])
             coordinates = (axes @ R) @ other.points.T + ((t - surface.origin) @ axes.T)[..., None]
@@ -123,52 +126,16 @@ class BodyFace:
 
     def _is_behind(self, points: np.ndarray) -> np.ndarray:
         """Return a mask (point,) of the points (point, 3) [mm] that may lie behind this face."""
-        if not self._pieces or len(self._unknown.mesh.faces):
+        if not self.face.pieces or len(self.face.unknown.mesh.faces):
             return np.ones(len(points), dtype=bool)
-        return np.any([surface.distance(points)[0] * (-1 if hollow else 1) < 0 for surface, hollow, _ in self._pieces], axis=0)
+        return np.any(
+            [surface.distance(points)[0] * (-1 if hollow else 1) < 0 for surface, hollow, _ in self.face.pieces], axis=0
+        )
 
     @cached_property
     def _bulge(self) -> float:
         """The largest distance [mm] of analytic surfaces from the body's flat triangles."""
-        return max((piece.face.chord_height for piece in self._pieces), default=0.0)
-
-    @cached_property
-    def _pieces(self) -> list[Piece]:
-        return self.face.pieces
-
-    @cached_property
-    def _unknown(self) -> Surface:
-        return self.face.unknown
-
-    @cached_property
-    def plane(self) -> tuple[np.ndarray, float] | None:
-        """Normal and height of the bounding plane of a flat face; None if the face is not flat."""
-        return _plane_of(self.face)
-
-    @cached_property
-    def _is_closed(self) -> bool:
-        return bool(self.body.is_watertight)
-
-    @cached_property
-    def _vertices(self) -> np.ndarray:
-        return np.ascontiguousarray(self.body.vertices, dtype=np.float64)
-
-    @cached_property
-    def _faces(self) -> np.ndarray:
-        return np.ascontiguousarray(self.body.faces, dtype=np.int64)
-
-
-class PairForm(Protocol):
-    """The form deviations of both faces of a pair."""
-
-    def take(self, rows: slice | np.ndarray) -> "PairForm":
-        """Return the form deviations of some rows."""
-
-    def at_face(self, k: int, row: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Return the form deviation (k,) [mm] of one face at `places` (k, 3), each in its own row; face 0 is the moving one."""
-
-    def highest(self) -> np.ndarray:
-        """Return upper bounds (face, row) [mm] of the form deviations of both faces."""
+        return max((piece.face.chord_height for piece in self.face.pieces), default=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +146,7 @@ class FacePair:
     reference: BodyFace
     rounding: float = 0.0
 
-    def penetrate(self, X_RM: np.ndarray, heights: np.ndarray, form: "PairForm | None" = None) -> np.ndarray:
+    def penetrate(self, X_RM: np.ndarray, heights: np.ndarray, form: Any = None) -> np.ndarray:
         """Return whether (row,) either face penetrates the other body at X_RM (row, 12); `heights` and `form` as in `depth`."""
         hits = np.zeros(len(X_RM), dtype=bool)
         for every in (THINNED, 1):
@@ -188,11 +155,13 @@ class FacePair:
             hits[rows] = self.depth(X_RM[rows], heights[rows], row_form, every=every) > 0
         return hits
 
-    def depth(self, X_RM: np.ndarray, heights: np.ndarray, form: "PairForm | None" = None, *, every: int = 1) -> np.ndarray:
+    def depth(self, X_RM: np.ndarray, heights: np.ndarray, form: Any = None, *, every: int = 1) -> np.ndarray:
         """Return the largest depth (row,) [mm] of either face in the other's body at X_RM (row, 12).
 
         `heights` (row,) [mm] is the sum of the outward offsets of both faces; each face counts it in full. With a `form`, the
-        local form deviations of both faces are added. Of the points that may lie inside, one in `every` is checked.
+        local form deviations of both faces are added: it has `take(rows)`, `at_face(k, row, points)` (k,) [mm] with each point
+        in its own row, and upper bounds `highest()` (face, row) [mm]; face 0 is the moving one. Of the points that may lie
+        inside, one in `every` is checked.
         """
         largest = np.zeros(len(X_RM))
         highest = np.zeros((2, len(X_RM))) if form is None else form.highest()
@@ -232,11 +201,11 @@ def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
     points = unique_points(_spread(face.mesh, step, count))
     if len(points) > MAX_POINTS:
         points = points[np.random.default_rng(0).choice(len(points), MAX_POINTS, replace=False)]
-    flat = _plane_of(face)
-    if flat is not None:
-        return BodyFace(face, body, points, np.broadcast_to(flat[0], points.shape))
+    plane = _plane_of(face)
+    if plane is not None:
+        return BodyFace(face, SolidBody(body), points, np.broadcast_to(plane[0], points.shape), plane)
     projections, normals, _ = face.project(points)
-    return BodyFace(face, body, projections if face.surfaces else points, normals)
+    return BodyFace(face, SolidBody(body), projections if face.surfaces else points, normals, None)
 
 
 def _plane_of(face: Surface) -> tuple[np.ndarray, float] | None:

@@ -13,7 +13,7 @@ from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.brep_face import analytic_surfaces, describe_faces, faces_at, number_faces
-from tolcontact.geometry.face_in_file import FaceInFile, group_lines
+from tolcontact.geometry.face_groups import FaceInFile, group_lines
 from tolcontact.geometry.files import BREP, STATED_FACES
 from tolcontact.geometry.shapes import placement_of
 from tolcontact.geometry.surface import Surface
@@ -203,11 +203,10 @@ def _brep_numbers(face: Face, mesh: trimesh.Trimesh, which: int | str | Vector) 
 
 def _by_name(face: Face, names: Sequence[str], name: str) -> np.ndarray:
     if name not in names:
-        listed = ", ".join(
-            f'"{shown_name(entry)}"' for entry in [entry for entry in dict.fromkeys(names) if entry][:MAX_LISTED]
-        )
+        distinct = [entry for entry in dict.fromkeys(names) if entry]
+        listed = ", ".join(f'"{shown_name(entry)}"' for entry in distinct[:MAX_LISTED])
         content = f"its faces are called {listed}" if listed else "its file gives no face of it a name"
-        more = ", ...; tolcontact faces lists them" if len(set(names) - {""}) > MAX_LISTED else ""
+        more = ", ...; tolcontact faces lists them" if len(distinct) > MAX_LISTED else ""
         raise GeometryFault(f"face {face}: the part has no such face; {content}{more}")
     return np.flatnonzero(np.array(names) == name)
 
@@ -230,7 +229,7 @@ def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
     masks = _NEARNESS.setdefault(meshes[face.part], WeakKeyDictionary()).setdefault(meshes[selection.part], {})
     key = (*((part.at, part.rotation, part.mirror) for part in parts), selection.within)
     if key not in masks:
-        mesh, neighbour = (_in_place(part, meshes[part]) for part in parts)
+        mesh, neighbour = (placed_mesh(meshes[part].vertices, meshes[part].faces, *placement_of(part)) for part in parts)
         masks[key] = _near_mask(mesh, neighbour, selection.within)
     return masks[key]
 
@@ -243,15 +242,10 @@ def _near_mask(mesh: trimesh.Trimesh, neighbour: trimesh.Trimesh, within: float)
     # Both are sampled, since either part may be small compared with the other.
     for sampled, target in ((mesh, neighbour), (neighbour, mesh)):
         origin, hit = _near_pieces(sampled, target, within, ~mask if target is mesh else np.ones(len(target.faces), dtype=bool))
-        mask[(origin if sampled is mesh else hit)[_are_opposing(sampled, origin, target, hit)]] = True
+        cosines = (np.asarray(sampled.face_normals)[origin] * np.asarray(target.face_normals)[hit]).sum(axis=1)
+        mask[(origin if sampled is mesh else hit)[cosines < OPPOSING_COSINE]] = True
         mask = np.isin(face_of, face_of[mask])
     return mask
-
-
-def _are_opposing(mesh: trimesh.Trimesh, triangles: np.ndarray, target: trimesh.Trimesh, facing: np.ndarray) -> np.ndarray:
-    """Return a mask (pair,) of triangles (pair,) of a mesh, and of a target, whose outward normals are opposite."""
-    normals, target_normals = np.asarray(mesh.face_normals)[triangles], np.asarray(target.face_normals)[facing]
-    return np.asarray((normals * target_normals).sum(axis=1) < OPPOSING_COSINE)
 
 
 def _near_pieces(
@@ -304,10 +298,6 @@ def _facing_pieces(
         return np.arange(len(pieces))
     are_opposing = normals @ target_normals[nearby].T < OPPOSING_COSINE + ROUNDING
     return np.flatnonzero((are_opposing & overlaps(lower, upper, low[nearby], high[nearby])).any(axis=1))
-
-
-def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    return placed_mesh(mesh.vertices, mesh.faces, *placement_of(part))
 
 
 def _cut(surface: Surface, box: Inside, margin: float) -> Surface:

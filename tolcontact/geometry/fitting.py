@@ -65,8 +65,7 @@ def nearest_surface(triangles: np.ndarray) -> AnalyticSurface:
     samples = np.vstack([vertices, triangles.mean(axis=1)])  # two rings of vertices alone also lie on a sphere
     surfaces = [fit(vertices, triangles) for fit in FITS]
     return min(
-        (surface for surface in surfaces if surface is not None),
-        key=lambda surface: np.abs(surface.distance(samples)[0]).max(),
+        (surface for surface in surfaces if surface is not None), key=lambda surface: np.abs(surface.distance(samples)[0]).max()
     )
 
 

@@ -4,34 +4,19 @@ Rounding tilts the triangles of a plane relative to each other, by the coordinat
 touch as drawn penetrate each other. Planes are made flat again, and all faces move into the material by the error.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.geometry.triangle_mesh import have_area
-from tolcontact.geometry.vertex_displacements import TINY, capped, displacements
 
 MIN_ANGLE, MAX_ANGLE = 1e-6, 0.05  # rad: triangles at a smaller angle may always be one plane, at a larger one never
 MAX_ERRORS = 2.0  # coordinate errors: largest distance of a vertex from its fitted plane
 MAX_DISPLACEMENT = 20.0  # coordinate errors: largest displacement of a vertex, where faces meet at sharp angles
 MIN_CROSSING = 1e-3  # smallest singular value of the normals of planes that meet in a line or a corner
 ROUNDED = 1e-9  # smaller components of normals are 0
-
-
-class Planes(NamedTuple):
-    """The planes of a mesh, in pairs of a plane and one of its vertices.
-
-    number, vertex   (pair,) index of the plane, and of the vertex
-    normals          (pair, 3) outward
-    heights          (pair,) [mm] of the plane above the vertex
-    """
-
-    number: Int[Array, " pair"]
-    vertex: Int[Array, " pair"]
-    normals: Float[Array, "pair 3"]
-    heights: Float[Array, " pair"]
+TINY = 1e-300
+SAME_PLANE = 1e-5  # rad: planes at a smaller angle are one
 
 
 def smaller(body: trimesh.Trimesh, error: float) -> trimesh.Trimesh:
@@ -50,19 +35,18 @@ def inset(mesh: trimesh.Trimesh, error: float) -> Float[Array, "vertex 3"]:
     first, and the others are fitted as well as possible.
     """
     label = _coplanar(mesh, error)
-    planes = _fitted(mesh, label)
-    curved = np.unique(planes.number[np.abs(planes.heights) > MAX_ERRORS * error])
+    plane, vertices, normals, heights = _fitted(mesh, label)
+    curved = np.unique(plane[np.abs(heights) > MAX_ERRORS * error])
     if curved.size:  # triangles that approximate a curved face, at small angles
         alone = np.flatnonzero(np.isin(label, curved))
         label[alone] = label.max() + 1 + np.arange(len(alone))
         label = np.unique(label, return_inverse=True)[1]
-        planes = _fitted(mesh, label)
-    is_joint = (np.bincount(label) > 1)[planes.number]
-    N, heights, count = planes.normals, planes.heights - error, len(mesh.vertices)
-    vertex, joint = planes.vertex[is_joint], N[is_joint]
-    moved = displacements(vertex, joint, np.column_stack([heights[is_joint], joint]), count, MIN_CROSSING)
+        plane, vertices, normals, heights = _fitted(mesh, label)
+    is_joint, heights, count = (np.bincount(label) > 1)[plane], heights - error, len(mesh.vertices)
+    joint = normals[is_joint]
+    moved = displacements(vertices[is_joint], joint, np.column_stack([heights[is_joint], joint]), count, MIN_CROSSING)
     motions, free = moved[..., 0], np.eye(3) - moved[..., 1:]  # free: projection onto the directions left free by these planes
-    vertex, lone = planes.vertex[~is_joint], N[~is_joint]
+    vertex, lone = vertices[~is_joint], normals[~is_joint]
     remainder = heights[~is_joint] - (lone * motions[vertex]).sum(axis=1)
     lone = (lone[:, None] @ free[vertex])[:, 0]
     lone[np.abs(lone) < ROUNDED] = 0
@@ -80,8 +64,12 @@ def _coplanar(mesh: trimesh.Trimesh, error: float) -> Int[Array, " face"]:
     return np.asarray(trimesh.graph.connected_component_labels(neighbours[is_flat], node_count=len(mesh.faces)), dtype=np.int64)
 
 
-def _fitted(mesh: trimesh.Trimesh, label: np.ndarray) -> Planes:
-    """Return the planes fitted to the vertices of the triangles of each label (face,)."""
+def _fitted(mesh: trimesh.Trimesh, label: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the planes fitted to the vertices of the triangles of each label (face,), in pairs of a plane and a vertex of it.
+
+    The results are the indices of both (pair,), the outward normals (pair, 3), and the heights (pair,) [mm] of the planes above
+    the vertices.
+    """
     number, vertex = np.unique(np.column_stack([label.repeat(3), np.asarray(mesh.faces).ravel()]), axis=0).T
     points, areas = np.asarray(mesh.vertices)[vertex], np.asarray(mesh.area_faces)[:, None] * np.asarray(mesh.face_normals)
     centres = _sums(number, points) / np.bincount(number)[:, None]
@@ -89,9 +77,49 @@ def _fitted(mesh: trimesh.Trimesh, label: np.ndarray) -> Planes:
     moments = _sums(number, (arms[:, :, None] * arms[:, None]).reshape(-1, 9)).reshape(-1, 3, 3)
     normals = np.linalg.eigh(moments)[1][:, :, 0]
     normals *= np.where((normals * _sums(label, areas)).sum(axis=1) < 0, -1.0, 1.0)[:, None]
-    return Planes(number, vertex, normals[number], -(arms * normals[number]).sum(axis=1))
+    return number, vertex, normals[number], -(arms * normals[number]).sum(axis=1)
 
 
 def _sums(group: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return the sums (group, column) of values (row, column) of each group (row,)."""
     return np.column_stack([np.bincount(group, column) for column in values.T])
+
+
+def displacements(
+    vertex: Int[Array, " p"],
+    normals: Float[Array, "p 3"],
+    heights: Float[Array, "p k"],
+    count: int,
+    min_singular: float,
+    motions: Float[Array, "p 3 k"] | None = None,
+) -> Float[Array, "count 3 k"]:
+    """Return displacements u of `count` vertices onto their adjacent planes: N u = h, by least squares, with the shortest u.
+
+    Each of the k columns is a separate case. In a direction whose singular value is below `min_singular`, as a share of the
+    largest singular value, or of 1 if that is larger, u is the mean of the planes' `motions`, weighted by how much each plane
+    restricts that direction; without `motions`, or if all planes are one, it is 0.
+
+    vertex    (p,): the vertex of each plane
+    normals   (p, 3): of unit length, or shorter
+    heights   (p, k) of the planes above the vertices
+    motions   (p, 3, k) of the points of the planes at the vertices
+    """
+    squares, sides = np.zeros((count, 3, 3)), np.zeros((count, 3, heights.shape[1]))
+    np.add.at(squares, vertex, normals[:, :, None] * normals[:, None])
+    np.add.at(sides, vertex, normals[:, :, None] * heights[:, None])
+    values, vectors = np.linalg.eigh(squares)
+    is_determined = values > min_singular**2 * values.max(axis=1, initial=1.0, keepdims=True)
+    inverse = np.where(values > SAME_PLANE**2, 1 / np.maximum(values, TINY), 0.0)[..., None]
+    along = np.where(is_determined[..., None], vectors.swapaxes(1, 2) @ sides, 0.0)
+    if motions is not None:
+        axes = vectors[vertex].swapaxes(1, 2)
+        means = np.zeros_like(along)
+        np.add.at(means, vertex, (axes @ normals[..., None]) ** 2 * (axes @ motions))
+        along = np.where(is_determined[..., None], along, means)
+    return np.asarray(vectors @ (inverse * along))
+
+
+def capped(vectors: Float[Array, "n 3"], length: float) -> Float[Array, "n 3"]:
+    """Return vectors no longer than `length`."""
+    lengths = np.linalg.norm(vectors, axis=1)
+    return vectors * np.minimum(1.0, length / np.maximum(lengths, TINY))[:, None]

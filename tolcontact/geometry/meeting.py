@@ -22,11 +22,10 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel, places_kernel
-from tolcontact.geometry.facing_planes import facing_planes, moot_corners
+from tolcontact.geometry.candidates import facing_planes, moot_corners, sorted_candidates
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER, TINY
 from tolcontact.geometry.places import PLAIN, Look, Places
 from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
-from tolcontact.geometry.sorted_candidates import sorted_candidates
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.triangle_mesh import blocks, overlaps
 
@@ -146,8 +145,8 @@ class Meeting:
             return None
         travel, tilt = EXTENSION_FACTOR * self.reach.travel, EXTENSION_FACTOR * (self.reach.tilt + TILT_MARGIN)
         reach = self.reach._replace(travel=travel, tilt=tilt)
-        extended = _meeting(self.moving, self.reference, reach, self.size, has_form=self.has_form)
-        return None if extended is None else replace(extended, overhang=self.overhang, is_free=self.is_free, slope=self.slope)
+        candidates = _candidates(self.moving, self.reference, reach, self.size, has_form=self.has_form)
+        return None if candidates is None else replace(self, candidates=candidates, reach=reach)
 
     @property
     def turn(self) -> float:
@@ -231,10 +230,11 @@ def meeting(faces: tuple[Surface, Surface], bodies: tuple, reach: Reach, *, has_
     """
     A, B = (polyhedron(face, body) for face, body in zip(faces, bodies, strict=True))
     size = float(max(np.ptp(face.mesh.vertices, axis=0).max() for face in faces))
-    return _meeting(A, B, reach, size, has_form=has_form)
+    candidates = _candidates(A, B, reach, size, has_form=has_form)
+    return None if candidates is None else Meeting(A, B, candidates, reach, size, has_form=has_form)
 
 
-def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float, *, has_form: bool) -> Meeting | None:
+def _candidates(A: Polyhedron, B: Polyhedron, reach: Reach, size: float, *, has_form: bool) -> places_kernel.Candidates | None:
     comparisons = len(A.vertices) * len(B.facets) + len(A.facets) * len(B.vertices) + len(A.edges) * len(B.edges)
     if comparisons > MAX_COMPARISONS:
         return None
@@ -251,7 +251,7 @@ def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float, *, has_for
     table = np.column_stack([kinds, np.concatenate(parts)])
     if not has_form:
         table = table[~moot_corners(A, B, facets, table)]
-    return Meeting(A, B, sorted_candidates(A, B, table, facets, has_form=has_form), reach, size, has_form=has_form)
+    return sorted_candidates(A, B, table, facets, has_form=has_form)
 
 
 def _passed(reach: Reach, size: float) -> float:

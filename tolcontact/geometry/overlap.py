@@ -1,14 +1,24 @@
-"""Points where the rim of one face lies over or under the other face, where the faces touch first at any tilt."""
+"""Where two faces are over each other: where their rims cross, and the part of a face that is opposite to the other."""
+
+from typing import NamedTuple
 
 import numpy as np
+import trimesh
 
 from tolcontact.geometry.surface import Surface
-from tolcontact.geometry.triangle_mesh import edges
+from tolcontact.geometry.triangle_mesh import edges, overlaps
 
 MAX_EDGES = 2000  # of a rim; above this its corners are so dense that evenly spread points suffice
 MIN_ANGLE = np.radians(1.0)  # between edges that cross
 INWARD = 1e-5  # of the face's size: distance of points inside the rim
 DROP_ITERATIONS = 8  # of points that drop onto a curved face
+MAX_PAIRS = 1_000_000  # of triangles that may be opposite to each other, and of pieces at any time
+MAX_COMPARED = 4_000_000  # pairs that may be nearer than a pair of the same triangle, for all pairs
+BLOCK_TRIANGLES = 64
+TIE = 1e-10  # of the face's size: distances that count as 0
+MIN_AREA = 1e-14  # of the face's area: smaller triangles are rounding
+BEHIND = 0.1  # of the distance in front of a face: how far behind it opposite faces count
+FACING = 1e-9  # smallest cosine of the angle between normals of triangles that face each other
 
 
 def overlap_corners(face: Surface, target: Surface) -> np.ndarray:
@@ -105,3 +115,152 @@ def points_on_rim(face: Surface, step: float) -> np.ndarray:
     starts, ends = face.rim_ends.swapaxes(0, 1)
     pieces = np.maximum(np.ceil(np.linalg.norm(ends - starts, axis=1) / step), 1).astype(int)
     return np.concatenate([np.linspace(a, b, count, endpoint=False) for a, b, count in zip(starts, ends, pieces, strict=True)])
+
+
+def opposite(face: Surface, target: Surface, within: float) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the part of a face that is over the target, along its normals, within a distance [mm] in front of it.
+
+    A tenth of this distance behind it counts, too, since bodies may penetrate each other nominally. The target must face it
+    there. Over several triangles of the target, the nearest one counts. The result is exact for polyhedra and does not depend
+    on their triangles: triangles (triangle, 3, 3) [mm] of the face, and the cosines (triangle,) of their angles to the target.
+    It is None if too many triangles overlap to cut them all.
+    """
+    corners, normals = np.asarray(face.mesh.triangles), np.asarray(face.mesh.face_normals)
+    target_corners, target_normals = np.asarray(target.mesh.triangles), np.asarray(target.mesh.face_normals)
+    rows, columns = _overlapping(corners, target_corners, within * target_normals[:, None])
+    if len(rows) > MAX_PAIRS:
+        return None
+    cosines = -(normals[rows] * target_normals[columns]).sum(axis=1)
+    rows, columns, cosines = (values[cosines > FACING] for values in (rows, columns, cosines))
+    tie = TIE * float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
+    pairs = _Pairs(target_corners[columns], target_normals[columns], tie)
+    pieces, pair = corners[rows], np.arange(len(rows))
+    for k in range(3):
+        pieces, pair = _above(pieces, pair, pairs.edge_distances(pair, pieces)[:, k])
+    for sign, limit in ((1, BEHIND * within), (-1, within)):
+        pieces, pair = _above(pieces, pair, limit + sign * pairs.heights(pair, pieces))
+    least = MIN_AREA * face.mesh.area
+    large = trimesh.triangles.area(pieces) > least
+    nearest = pairs.nearest(pieces[large], pair[large], rows)
+    if nearest is None:
+        return None
+    pieces, pair = nearest
+    large = trimesh.triangles.area(pieces) > least
+    return pieces[large], cosines[pair[large]]
+
+
+class _Pairs(NamedTuple):
+    """Pairs of a triangle and a target triangle that face each other.
+
+    corners   (pair, 3, 3) [mm] of the target triangles, and their `normals` (pair, 3)
+    tie       [mm]: smaller distances count as 0
+    """
+
+    corners: np.ndarray
+    normals: np.ndarray
+    tie: float
+
+    def heights(self, pair: np.ndarray, pieces: np.ndarray) -> np.ndarray:
+        """Return the distances (piece, 3) [mm] of the corners of pieces from the target planes of pairs (piece,)."""
+        heights = np.einsum("pck,pk->pc", pieces - self.corners[pair, None, 0], self.normals[pair])
+        return np.where(np.abs(heights) <= self.tie, 0.0, heights)
+
+    def edge_distances(self, pair: np.ndarray, pieces: np.ndarray) -> np.ndarray:
+        """Return how far (piece, edge, 3) [mm] the corners of pieces are inside the edges of the target triangles."""
+        starts = self.corners[pair]
+        inward = np.cross(self.normals[pair, None], np.roll(starts, -1, axis=1) - starts)
+        inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-300)
+        distances = np.einsum("peck,pek->pec", pieces[:, None] - starts[:, :, None], inward)
+        return np.where(np.abs(distances) <= self.tie, 0.0, distances)
+
+    def nearest(self, pieces: np.ndarray, pair: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return pieces (piece, 3, 3) and their pairs (piece,) without the parts where another pair of their row is nearer.
+
+        rows   (pair,) the triangle of each pair
+        """
+        left = np.unique(pair)  # sorted by rows
+        _, first, index, count = np.unique(rows[left], return_index=True, return_inverse=True, return_counts=True)
+        if float(count @ count) > MAX_COMPARED:
+            return None
+        place = np.zeros(len(rows), dtype=int)
+        place[left] = np.arange(len(left))
+        heights = self.heights(pair, pieces)
+        behind = (heights < 0).any(axis=1)
+        back = _above(pieces[behind], pair[behind], -heights[behind])
+        front = _above(pieces, pair, heights)
+        pieces, pair = (np.concatenate(values) for values in zip(front, back, strict=True))
+        side = np.repeat([1.0, -1.0], [len(front[1]), len(back[1])])
+        for step in range(1, int(count.max(initial=0))):
+            group = index[place[pair]]
+            others = left[first[group] + (place[pair] - first[group] + step) % count[group]]
+            pieces, source = self._uncovered(pieces, pair, side, np.where(step < count[group], others, pair))
+            pair, side = pair[source], side[source]
+            if len(pieces) > MAX_PAIRS:
+                return None
+        return pieces, pair
+
+    def _uncovered(
+        self, pieces: np.ndarray, pair: np.ndarray, side: np.ndarray, others: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the parts of pieces where the target triangles of `others` (piece,) are not nearer, and their indices."""
+
+        def margins(rows: np.ndarray, parts: np.ndarray) -> np.ndarray:
+            own, other = side[rows, None] * self.heights(pair[rows], parts), self.heights(others[rows], parts)
+            limits = np.stack([own - other, own + other], axis=1)
+            limits[np.abs(limits) <= self.tie] = 0.0
+            return np.concatenate([self.edge_distances(others[rows], parts), limits], axis=1)
+
+        source = np.arange(len(pieces))
+        is_covered = (margins(source, pieces).max(axis=2) > 0).all(axis=1) & (others != pair)
+        outside, inside, rows = [(pieces[~is_covered], source[~is_covered])], pieces[is_covered], source[is_covered]
+        for k in range(5):
+            values = margins(rows, inside)[:, k]
+            below = (values < 0).any(axis=1)
+            outside.append(_above(inside[below], rows[below], -values[below]))
+            inside, rows = _above(inside, rows, values)
+        parts, sources = (np.concatenate(values) for values in zip(*outside, strict=True))
+        return parts, sources
+
+
+def _overlapping(corners: np.ndarray, target_corners: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices of the pairs of triangles (triangle, 3, 3) with overlapping boxes; stops beyond MAX_PAIRS of them.
+
+    The box of a target triangle holds it moved by its `reach` (triangle, 1, 3) [mm], both ways.
+    """
+    swept = np.concatenate([target_corners - reach, target_corners + reach], axis=1)
+    lower, upper = swept.min(axis=1), swept.max(axis=1)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    rows, columns, count = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], 0
+    for first in range(0, len(corners), BLOCK_TRIANGLES):
+        block = slice(first, first + BLOCK_TRIANGLES)
+        nearby = np.flatnonzero(((lower <= high[block].max(axis=0)) & (upper >= low[block].min(axis=0))).all(axis=1))
+        row, column = np.nonzero(overlaps(low[block], high[block], lower[nearby], upper[nearby]))
+        rows.append(row + first)
+        columns.append(nearby[column])
+        count += len(row)
+        if count > MAX_PAIRS:
+            break
+    return np.concatenate(rows), np.concatenate(columns)
+
+
+def _above(triangles: np.ndarray, labels: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pieces (piece, 3, 3) of triangles (triangle, 3, 3) where the height, linear between corners, is positive.
+
+    The second array is the label (piece,) of each piece's triangle.
+    """
+    is_above = heights >= 0
+    count = is_above.sum(axis=1)
+    whole, tips, trunks = (np.flatnonzero(count == k) for k in (3, 1, 2))
+    a, ab, ac, _, _ = _cut(triangles[tips], heights[tips], np.argmax(is_above[tips], axis=1))
+    _, pq, pr, q, r = _cut(triangles[trunks], heights[trunks], np.argmin(is_above[trunks], axis=1))
+    pieces = [triangles[whole], *(np.stack(corners, axis=1) for corners in ((a, ab, ac), (pq, q, r), (pq, r, pr)))]
+    return np.concatenate(pieces), labels[np.concatenate([whole, tips, trunks, trunks])]
+
+
+def _cut(triangles: np.ndarray, heights: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the apex p of each triangle (the only corner on its side), the cuts of its edges, and its corners q and r."""
+    rows = np.arange(len(triangles))
+    (p, q, r), (h_p, h_q, h_r) = (
+        [values[rows, (apex + k) % 3] for k in range(3)] for values in (triangles, heights[..., None])
+    )
+    return p, p + h_p / (h_p - h_q) * (q - p), p + h_p / (h_p - h_r) * (r - p), q, r

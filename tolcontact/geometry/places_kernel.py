@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
-from tolcontact.geometry.choice_kernel import choose, drop_beyond_ridges, is_near, keep_shallowest, least
 from tolcontact.geometry.kernel import (
     CORNER_ON_FACET,
     EDGE_ON_EDGE,
@@ -16,23 +15,17 @@ from tolcontact.geometry.kernel import (
     MAX_TILT_SINE,
     NOWHERE,
     TINY,
+    choose,
     corner_on_facet,
+    drop_beyond_ridges,
+    drop_passed,
     edge_on_edge,
     facet_on_corner,
+    is_near,
+    keep_shallowest,
+    least,
 )
-from tolcontact.geometry.passed_kernel import drop_passed
-from tolcontact.geometry.vector_kernel import (
-    cross,
-    dot,
-    first_from,
-    is_within,
-    minus,
-    move,
-    move_back,
-    row,
-    row_of,
-    turn,
-)
+from tolcontact.geometry.vector_kernel import cross, dot, first_from, is_within, minus, move, move_back, row, row_of, turn
 
 LEVEL = MAX_TILT_SINE - 2 * IN_PLANE  # sine of the angle between planes: edges in one of them rise no further above the other
 MAX_SHEAR = 1.8  # lateral shift of a corner's projection per unit height, where planes face each other
@@ -72,15 +65,22 @@ class Candidates(NamedTuple):
     spans: np.ndarray
 
 
+@inlined_uncounted
+def _turn_square(X):  # type: ignore[no-untyped-def]
+    """Return |R - I|^2 at a pose X (12,)."""
+    square = 0.0
+    for i in range(9):
+        square += (X[i] - (1.0 if i % 4 == 0 else 0.0)) ** 2
+    return square
+
+
 @compiled
 def cover(poses, corners, travel, turn, covered):  # type: ignore[no-untyped-def]
     """Write whether corners (v, 3) travel by at most `travel` [mm], and rotate by at most `turn` [rad], at X_RM (n, 12)."""
-    largest = 8 * math.sin(turn / 2) ** 2 if turn < math.pi else np.inf  # |R - I|^2
+    largest = 8 * math.sin(turn / 2) ** 2 if turn < math.pi else np.inf
     for k in range(poses.shape[0]):
-        X, square = poses[k], 0.0
-        for i in range(9):
-            square += (X[i] - (1.0 if i % 4 == 0 else 0.0)) ** 2
-        covered[k] = not square > largest
+        X = poses[k]
+        covered[k] = not _turn_square(X) > largest
         for j in range(corners.shape[0]):
             corner = row(corners, j)
             motion = minus(move(X, corner), corner)
@@ -166,11 +166,9 @@ def _lowest(A, B, candidates, s, moved):  # type: ignore[no-untyped-def]
 @inlined_uncounted
 def _motion(ball, X):  # type: ignore[no-untyped-def]
     """Return a bound on the motion [mm] of the points in a ball at a pose X_RM (12,) from their nominal places."""
-    centre, square = (ball[0], ball[1], ball[2]), 0.0
-    for i in range(9):
-        square += (X[i] - (1.0 if i % 4 == 0 else 0.0)) ** 2
+    centre = ball[0], ball[1], ball[2]
     motion = minus(move(X, centre), centre)
-    return math.sqrt(dot(motion, motion)) + math.sqrt(square) * ball[3]
+    return math.sqrt(dot(motion, motion)) + math.sqrt(_turn_square(X)) * ball[3]
 
 
 @uncounted

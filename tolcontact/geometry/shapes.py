@@ -77,7 +77,9 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     corners = np.asarray(mesh.triangles) - mesh.vertices.mean(axis=0)
     volume = np.bincount(body, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6, count)
     # A body with inward normals is a cavity if another body encloses it, otherwise an error.
-    lower, upper = (_per_body(limit, corners, body, count) for limit in (np.minimum, np.maximum))
+    lower, upper = np.full((2, count, 3), np.array([np.inf, -np.inf])[:, None, None])
+    np.minimum.at(lower, body, corners.min(axis=1))
+    np.maximum.at(upper, body, corners.max(axis=1))
     for k in np.flatnonzero(~is_open & (volume < -1e-12 * mesh.scale**3)):
         outer = np.flatnonzero((volume > 0) & (lower <= lower[k]).all(axis=1) & (upper >= upper[k]).all(axis=1))
         if not any(_encloses(mesh, body == candidate, mesh.triangles[body == k][0, :1]) for candidate in outer):
@@ -101,12 +103,6 @@ def _encloses(mesh: trimesh.Trimesh, faces: np.ndarray, point: np.ndarray) -> bo
     """Return whether the body of the `faces` (face,) encloses `point` (1, 3)."""
     turns = igl.winding_number(np.array(mesh.vertices), np.array(mesh.faces[faces], dtype=np.int64), np.array(point))
     return bool(np.abs(turns).max() > 0.5)
-
-
-def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int) -> np.ndarray:
-    extremes = np.full((count, 3), -limit.reduce(np.array([-np.inf, np.inf])))
-    limit.at(extremes, body, limit.reduce(corners, axis=1))
-    return extremes
 
 
 def placement_of(part: Part) -> tuple[np.ndarray, np.ndarray]:

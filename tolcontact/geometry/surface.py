@@ -8,9 +8,10 @@ import igl
 import numpy as np
 import trimesh
 from scipy.sparse import csr_array
+from trimesh.triangles import points_to_barycentric
 
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, axes_across
-from tolcontact.geometry.region_kernel import Region
+from tolcontact.geometry.plane_kernel import Region
 from tolcontact.geometry.tolerances import SAME_DIRECTION, SAME_PLACE
 from tolcontact.geometry.triangle_mesh import CREASE, on_rim, oriented, placed_mesh, rim, triangle_tree
 
@@ -73,7 +74,7 @@ class Surface:
             if rows.size:
                 yield surface, rows, float(self._sides[number])
 
-    @property
+    @cached_property
     def pieces(self) -> "list[Piece]":
         """The parts of the face that lie on its analytic surfaces."""
         return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._rows_on_surfaces()]
@@ -97,7 +98,7 @@ class Surface:
             default=0.0,
         )
 
-    @property
+    @cached_property
     def unknown(self) -> "Surface":
         """The triangles that approximate no analytic surface."""
         return self.part(np.flatnonzero(self.surface_numbers < 0))
@@ -186,7 +187,7 @@ class Surface:
 
     def normals(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Return outward unit normals (point, 3) at `points` (point, 3) [mm] on the triangles `triangle` (point,)."""
-        barycentric = self._barycentric(triangle, points)
+        barycentric = points_to_barycentric(self.mesh.triangles[triangle], points)
         normals = (barycentric[..., None] * self.corner_normals[triangle]).sum(axis=1)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         for surface, rows, side in self._rows_on_surfaces(triangle):
@@ -199,9 +200,6 @@ class Surface:
         surfaces = [surface.placed(R, t) for surface in self.surfaces]
         return Surface(mesh, oriented(self.corner_normals, R) @ R.T, surfaces, self.surface_numbers)
 
-    def _barycentric(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
-        return trimesh.triangles.points_to_barycentric(self.mesh.triangles[triangle], points)
-
     def project(self, points: np.ndarray, *, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Project `points` (point, 3) [mm] onto the surface.
 
@@ -210,16 +208,6 @@ class Surface:
         analytic surface, nearest points and normals refer to that surface. On other curved faces normals are interpolated
         between the corners of a facet, so that they change continuously as a point moves.
         """
-        triangle, projections, is_over = self._projections(points, margin)
-        return projections, self.normals(triangle, projections), is_over
-
-    def projections(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the nearest points and the mask that `project` returns, without the normals."""
-        _, projections, is_over = self._projections(points, 0.0)
-        return projections, is_over
-
-    def _projections(self, points: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the nearest triangles (point,), and the nearest points and the mask that `project` returns."""
         triangle, nearest = self.nearest(points)
         lateral, at_rim = self._lateral_distances(points, triangle, nearest)
         is_over = ~at_rim | (lateral <= max(margin, SAME_PLACE * self.mesh.scale))
@@ -231,7 +219,7 @@ class Surface:
             # Points near the axis of a surface, or beyond it, have projections elsewhere.
             is_direct = ~at_rim[rows] & (shift <= MAX_TURN * height + MAX_BULGE * self.mesh.scale)
             projections[rows] = np.where(is_direct[:, None], direct, nearby)
-        return triangle, projections, is_over
+        return projections, self.normals(triangle, projections), is_over
 
     def depth(self, points: np.ndarray) -> np.ndarray:
         """Return the depth (point,) [mm] of `points` (point, 3) [mm] behind the surface; 0 in front of it or beyond its rim."""
@@ -263,7 +251,7 @@ class Surface:
             normal[rows] = surface.distance(nearest[rows])[1]
         offset = points - nearest
         lateral = np.linalg.norm(offset - (offset * normal).sum(axis=1, keepdims=True) * normal, axis=1)
-        coordinates = self._barycentric(triangle, nearest)
+        coordinates = points_to_barycentric(self.mesh.triangles[triangle], nearest)
         # Edge j of a triangle runs from corner j to corner j+1, so on it the coordinate of corner j+2 is zero. A triangle may
         # also touch the rim with a corner only.
         at_rim = (np.abs(coordinates[:, [2, 0, 1]]) < 1e-9) & self._rim_edges[triangle]

@@ -102,7 +102,8 @@ def subdivided(
     origin = np.arange(len(faces))
     done, origins = list[np.ndarray](), list[np.ndarray]()
     for _ in range(MAX_ROUNDS + 1):
-        is_long = np.sqrt(sum(_edge_components(column[faces]) ** 2 for column in vertices.T[:3])) > max_edge
+        components = (column[faces] for column in vertices.T[:3])
+        is_long = np.sqrt(sum((np.roll(corners, -1, axis=1) - corners) ** 2 for corners in components)) > max_edge
         divides = is_long.any(axis=1)
         done.append(faces[~divides])
         origins.append(origin[~divides])
@@ -119,17 +120,12 @@ def subdivided(
     raise ValueError(f"triangles have edges longer than {max_edge:g} after {MAX_ROUNDS} rounds of halving")
 
 
-def _edge_components(corners: np.ndarray) -> np.ndarray:
-    """Return a component (face, 3) of the edge vectors of triangles, from the same component of their corners (face, 3)."""
-    return np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 2]], axis=1)
-
-
 def _pieces(
     vertices: np.ndarray, faces: np.ndarray, midpoints: np.ndarray, is_long: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the pieces (piece, 3) of faces (face, 3), and the row (piece,) of each piece's face.
 
-    middles   (face, 3) vertex indices of the midpoints of the edges marked in `is_long` (face, 3)
+    midpoints   (face, 3) vertex indices of the midpoints of the edges marked in `is_long` (face, 3)
     """
     count = is_long.sum(axis=1)
     single, double, triple = (np.flatnonzero(count == k) for k in (1, 2, 3))

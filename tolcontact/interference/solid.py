@@ -7,10 +7,9 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.geometry.inset import smaller
-from tolcontact.geometry.merged_surface import merged_surface
+from tolcontact.geometry.inset import SAME_PLANE, capped, displacements, smaller
+from tolcontact.geometry.polyhedron import merged_surface
 from tolcontact.geometry.triangle_mesh import coordinate_error, edges
-from tolcontact.geometry.vertex_displacements import SAME_PLANE, capped, displacements
 from tolcontact.interference.opposing_planes import MIN_SINGULAR, divided
 
 MAX_SHIFT = 8.0  # insets: the largest motion of a vertex, for needles

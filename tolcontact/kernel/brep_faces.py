@@ -18,7 +18,6 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face
 
 RECOGNITION_TOLERANCE = 1e-4  # [mm] between a B-spline surface and the simple surface for which it is taken
-
 AREA_TOLERANCE = 1e-9  # relative, of the areas of planes, and 1e-7 of B-spline surfaces
 
 Measure = tuple[float, tuple[float, ...], list[float]]  # area of a face [mm2], a point on it, and its outward normal there
@@ -37,9 +36,8 @@ def explore(shape: Any, kind: Any) -> Iterator[Any]:
         explorer.Next()
 
 
-def matrix(location: Any) -> np.ndarray:
-    """Return the transform (4, 4) of a location."""
-    transform = location.Transformation()
+def matrix(transform: Any) -> np.ndarray:
+    """Return a transform of the kernel as an array (4, 4)."""
     rows = [[transform.Value(row, column) for column in range(1, 5)] for row in range(1, 4)]
     return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
 
@@ -63,7 +61,7 @@ def triangulation(faces: Sequence[Any]) -> dict[str, Any]:
             continue
         nodes = np.array([mesh.Node(k).Coord() for k in range(1, mesh.NbNodes() + 1)]).reshape(-1, 3)
         if not location.IsIdentity():
-            transform = matrix(location)
+            transform = matrix(location.Transformation())
             nodes = nodes @ transform[:3, :3].T + transform[:3, 3]
         indices = np.array([mesh.Triangle(k).Get() for k in range(1, mesh.NbTriangles() + 1)], dtype=np.int64).reshape(-1, 3)
         edges = nodes[indices[:, 1:] - 1] - nodes[indices[:, :1] - 1]
@@ -76,12 +74,8 @@ def triangulation(faces: Sequence[Any]) -> dict[str, Any]:
         triangles.append((indices[:, ::-1] if face.Orientation() == TopAbs_REVERSED else indices) - 1 + count)
         brep.append(np.full(len(indices), number))
         count += len(nodes)
-    return {
-        "vertices": np.concatenate(corners),
-        "triangles": np.concatenate(triangles),
-        "brep": np.concatenate(brep),
-        "measures": measures,
-    }
+    arrays: dict[str, list[np.ndarray]] = {"vertices": corners, "triangles": triangles, "brep": brep}
+    return {name: np.concatenate(pieces) for name, pieces in arrays.items()} | {"measures": measures}
 
 
 def middle_of_parameters(face: Any) -> list[tuple[float, float]]:

@@ -11,12 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.GeomToStep import GeomToStep_MakeCartesianPoint, GeomToStep_MakeDirection
+from OCP.gp import gp_Dir, gp_Pnt, gp_Trsf
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.STEPCAFControl import STEPCAFControl_Reader
+from OCP.StepGeom import StepGeom_CartesianTransformationOperator3d
 from OCP.StepShape import StepShape_ClosedShell
+from OCP.StepToGeom import StepToGeom
 from OCP.TCollection import TCollection_AsciiString, TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_AttributeIterator, TDF_Label, TDF_Tool
@@ -28,7 +33,6 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from tolcontact.child import Refusal
 from tolcontact.kernel.brep_faces import box, explore, matrix, surface, triangulation
-from tolcontact.kernel.operators import correct_operators
 
 try:
     from OCP.collections import Sequence_TDF_Label as LabelSequence
@@ -36,6 +40,8 @@ except ModuleNotFoundError:  # release 7.9 of OCP, which CadQuery 2.8 installs
     from OCP.TDF import TDF_LabelSequence as LabelSequence
 
 CODE_PAGES = {"utf-8": "UTF8", "gb18030": "GB", "shift_jis": "SJIS", "latin-1": "iso8859-1"}  # as the kernel calls them
+CLOSE = 1e-9  # between numbers of a motion that is read as it is stated
+SCALE_TOLERANCE = 1e-6
 NAMELESS, LABEL = ("NONE", ""), "=>["  # some systems' names of nameless faces; begins the kernel's label of a nameless shape
 
 
@@ -63,7 +69,7 @@ def read(
                    place, the names of the products that contain it, and its own name
     record_count   number of records in the file, if it has PMI
 
-    `operators` is the number of records that may place a shape mirrored (see `kernel.operators`).
+    `operators` is the number of records that may place a shape mirrored.
     """
     document = Document(path, encoding, operators, has_face_names=has_face_names, has_solids=has_solids, has_pmi=has_pmi)
     indices: dict[str, list[int]] = {}  # of shapes, by the label
@@ -82,17 +88,17 @@ def read(
     names = body_names([(shapes[index][0], place) for index, place in placed])
     return {
         "shapes": [
-            triangles
-            | {
-                "surfaces": [surface(face) for face in body.faces],
-                "names": body.face_names,
-                "records": document.face_records(body.faces),
-                "face_count": body.face_count,
-            }
+            dict(
+                triangles,
+                surfaces=[surface(face) for face in body.faces],
+                names=body.face_names,
+                records=document.face_records(body.faces),
+                face_count=body.face_count,
+            )
             for body, triangles in shapes
         ],
         "bodies": [
-            (index, matrix(place.location), box(shapes[index][0].faces, place.location), place.names, name)
+            (index, matrix(place.location.Transformation()), box(shapes[index][0].faces, place.location), place.names, name)
             for (index, place), name in zip(placed, names, strict=True)
         ],
         "record_count": len(document.entities),
@@ -156,16 +162,16 @@ class Document:
         if not XCAFDoc_ShapeTool.GetReferredShape_s(label, referred):
             referred = label
         # A place without a name of its own has the name of its product.
-        own = [name for name in (label_name(label), label_name(referred)) if not is_nameless(name)]
-        names = [*parents, *own[:1]]
+        product = stated(label_name(referred))
+        name = stated(label_name(label)) or product
+        names = [*parents, name] if name else parents
         if XCAFDoc_ShapeTool.IsAssembly_s(referred):
             components = LabelSequence()
             XCAFDoc_ShapeTool.GetComponents_s(referred, components, False)
             for component in components:
                 yield from self._places_within(component, names, location)
         else:
-            product = label_name(referred)
-            yield Place(names, "" if is_nameless(product) else product, location, referred)
+            yield Place(names, product, location, referred)
 
     def body_shapes(self, label: Any, chord: float, angle: float, *, is_alone: bool) -> Iterator[BodyShape]:
         """Yield the bodies of a product's shape, in its own frame, with triangles on their faces.
@@ -190,7 +196,6 @@ class Document:
             yield BodyShape(sheets, face_names(sheets, names), False, "", lost_count)
 
     def _body(self, piece: Any, names: dict[int, str], name: str = "", count: int = 0) -> BodyShape:
-        """Return the body of a solid or shell."""
         faces = [*explore(piece, TopAbs_FACE)]
         cavities = [*explore(piece, TopAbs_SHELL)][1:]
         return BodyShape(faces, face_names(faces, self._record_names(cavities) | names), count > 0, name, count)
@@ -238,7 +243,7 @@ def subshape_names(label: Any) -> dict[int, str]:
 def face_names(faces: Sequence[Any], names: dict[int, str]) -> list[str]:
     """Return the names of faces in the file, "" for a face without a name."""
     stripped = [names.get(hash(face), "").strip() for face in faces]
-    return ["" if name in NAMELESS or is_nameless(name) else name for name in stripped]
+    return ["" if name in NAMELESS else stated(name) for name in stripped]
 
 
 def entity_name(entity: Any) -> str:
@@ -264,9 +269,9 @@ def label_name(label: Any) -> str:
     return ""
 
 
-def is_nameless(name: str) -> bool:
-    """Return whether a label has no name of the file."""
-    return not name or name.startswith(LABEL)
+def stated(name: str) -> str:
+    """Return the name of a label if the file states it; "" for the kernel's own name."""
+    return "" if name.startswith(LABEL) else name
 
 
 def entry(label: Any) -> str:
@@ -274,3 +279,72 @@ def entry(label: Any) -> str:
     text = TCollection_AsciiString()
     TDF_Tool.Entry_s(label, text)
     return str(text.ToCString())
+
+
+def correct_operators(model: Any, count: int) -> None:
+    """Let the kernel read each of `count` operators in its model of a file as it is stated. Raises Refusal if it cannot.
+
+    Operators place copies of shapes: moved, mirrored or scaled (ISO 10303-42). The CAD kernel reads a mirror as a rotation, and
+    an operator that lacks parameters as no motion at all. Here its model of the file is corrected before it makes shapes: a
+    mirror is stated as a scale of -1, which is a point reflection, after a rotation.
+    """
+    entities = (model.Value(number) for number in range(1, model.NbEntities() + 1))
+    operators = [entity for entity in entities if isinstance(entity, StepGeom_CartesianTransformationOperator3d)]
+    if len(operators) < count or any(operator.LocalOrigin() is None for operator in operators):
+        raise Refusal("is damaged: a CARTESIAN_TRANSFORMATION_OPERATOR_3D has other parameters than ISO 10303; export it again")
+    for operator in operators:
+        _correct(operator)
+
+
+def _correct(operator: Any) -> None:
+    scale = operator.Scale() if operator.HasScale() else 1.0
+    if abs(scale + 1) <= SCALE_TOLERANCE and np.linalg.det(_motion(operator)[:, :3]) < 0:
+        return  # a mirror as the kernel itself writes and reads it, against the norm, which permits no scale below 0
+    if abs(scale - 1) > SCALE_TOLERANCE:
+        raise Refusal("places a body scaled, which bodies of a rigid assembly are not; export it as it is")
+    axes, origin = _axes(operator), np.array([operator.LocalOrigin().CoordinatesValue(k) for k in (1, 2, 3)])
+    sense = np.sign(np.linalg.det(axes))
+    if sense < 0:
+        operator.SetScale(-1.0)
+    operator.SetAxis1(_direction(sense * axes[:, 0]))
+    operator.SetAxis3(_direction(sense * axes[:, 2]))
+    for local_origin in (origin, sense * origin):  # some releases of the kernel scale it, too
+        operator.SetLocalOrigin(GeomToStep_MakeCartesianPoint(gp_Pnt(*local_origin), 1.0).Value())
+        if np.abs(_motion(operator) - np.column_stack([axes, origin])).max() <= CLOSE * max(1.0, np.abs(origin).max()):
+            return
+    raise Refusal("places a body mirrored, which this release of the CAD kernel cannot read; export the body itself")
+
+
+def _motion(operator: Any) -> np.ndarray:
+    """Return the motion (3, 4) of an operator as the kernel reads it."""
+    motion = gp_Trsf()
+    StepToGeom.MakeTransformation3d_s(operator, motion)
+    return matrix(motion)[:3]
+
+
+def _axes(operator: Any) -> np.ndarray:
+    """Return the directions of the three axes of an operator as columns (3, 3)."""
+    z = _stated_axis(operator.Axis3(), np.array([0.0, 0.0, 1.0]))
+    x = _stated_axis(operator.Axis1(), np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 1 - CLOSE else np.array([0.0, 1.0, 0.0]))
+    x = _unit(x - (x @ z) * z)
+    y = _stated_axis(operator.Axis2(), np.array([0.0, 1.0, 0.0]))
+    y = y - (y @ z) * z - (y @ x) * x
+    is_left_out = operator.Axis2() is None and np.linalg.norm(y) < CLOSE  # for the norm it would then have no direction
+    return np.column_stack([x, np.cross(z, x) if is_left_out else _unit(y), z])
+
+
+def _stated_axis(direction: Any, default: np.ndarray) -> np.ndarray:
+    return default if direction is None else _unit(np.array([direction.DirectionRatiosValue(k) for k in (1, 2, 3)]))
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(vector)
+    if length < CLOSE:
+        raise Refusal(
+            "is damaged: a CARTESIAN_TRANSFORMATION_OPERATOR_3D has parallel axes, or one of length 0; export it again"
+        )
+    return np.asarray(vector / length)
+
+
+def _direction(axis: np.ndarray) -> Any:
+    return GeomToStep_MakeDirection(gp_Dir(*axis)).Value()

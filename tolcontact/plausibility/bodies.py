@@ -10,7 +10,7 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.declaration import Part
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.features.feature_geometry import CylinderFeature
-from tolcontact.geometry.body_overlap import SolidBody, common_ball
+from tolcontact.geometry.nearest_elements import SolidBody, common_ball
 from tolcontact.interference import Clash
 from tolcontact.plausibility.suggested_lines import ClashPlace, contact_line, moving_first, overlap_line
 from tolcontact.plausibility.trial_draws import TrialDraws

@@ -7,15 +7,8 @@ import numpy as np
 
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.analytic_surfaces import are_opposed
-from tolcontact.geometry.brep_face import (
-    are_one_surface,
-    describe_faces,
-    faces_at,
-    faces_on_surfaces,
-    plain_vector,
-)
-from tolcontact.geometry.face_groups import FaceOnSurface
-from tolcontact.geometry.face_in_file import FaceInFile
+from tolcontact.geometry.brep_face import describe_faces, faces_at, faces_on_surfaces, plain_vector
+from tolcontact.geometry.face_groups import FaceInFile, FaceOnSurface, are_one_surface
 from tolcontact.geometry.files import FROM_PRODUCT, STATED_FACES, Shape
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
 from tolcontact.pmi.declarable import Undeclared

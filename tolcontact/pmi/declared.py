@@ -9,8 +9,8 @@ from tolcontact.declaration.values import script_line
 from tolcontact.errors import GeometryFault, OptionError
 from tolcontact.features.datum_frames import Declared
 from tolcontact.geometry.brep_face import describe_faces
+from tolcontact.geometry.listing import LISTING_CHORD, FacesOfRecords, bodies_in, faces_of_records, part_name
 from tolcontact.geometry.shapes import shape
-from tolcontact.geometry.step_listing import LISTING_CHORD, FacesOfRecords, bodies_in, faces_of_records, part_name
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
 from tolcontact.pmi.claims import NO_FACE, Annotation, Claim, DeclaredAnnotation, missing_faces
 from tolcontact.pmi.drafts import declare_features

@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tests.cases.blocks import combs
-from tolcontact.geometry.opposite import opposite
+from tolcontact.geometry.overlap import opposite
 from tolcontact.geometry.surface import Surface
 
 TURN, SHIFT = Rotation.from_rotvec((0.4, -1.1, 0.7)).as_matrix(), np.array((31.0, -17.0, 90.0))
@@ -20,9 +20,9 @@ def moments(face, target, within, R=None, t=(0, 0, 0)):
     for mesh in bodies:
         if np.linalg.det(A) < 0:
             mesh.invert()
-    part = opposite(*map(Surface, bodies), within)
-    places = ((part.triangles + np.roll(part.triangles, 1, axis=1)).reshape(-1, 3) / 2 - t) @ np.linalg.inv(A).T
-    shares = np.repeat(trimesh.triangles.area(part.triangles) * part.cosines / 3, 3)
+    part, cosines = opposite(*map(Surface, bodies), within)
+    places = ((part + np.roll(part, 1, axis=1)).reshape(-1, 3) / 2 - t) @ np.linalg.inv(A).T
+    shares = np.repeat(trimesh.triangles.area(part) * cosines / 3, 3)
     centre = shares @ places / shares.sum()
     return shares.sum(), centre, (places - centre).T @ ((places - centre) * shares[:, None]) / shares.sum()
 

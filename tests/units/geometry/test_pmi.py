@@ -12,7 +12,7 @@ from tests.helpers import call
 from tests.test_cad import COVER
 from tests.test_pmi import AP242, POSITION, step
 from tolcontact.errors import OptionError
-from tolcontact.geometry.step_listing import faces_of_records
+from tolcontact.geometry.listing import faces_of_records
 
 
 def cover_with_pmi(path):

@@ -6,7 +6,7 @@ import tolcontact as tc
 from tests.kernel_annotations import KernelItems, kernel_annotations
 from tests.second_reading import compare
 from tests.test_second_reading import write
-from tolcontact.geometry.step_listing import faces_of_records
+from tolcontact.geometry.listing import faces_of_records
 
 
 def test_faces_that_differ_have_the_numbers_of_the_listing(tmp_path):

@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tests.test_turned_assemblies import SHIFT, TURNS, moments, polygon_moments
-from tolcontact.geometry.opposite import opposite
+from tolcontact.geometry.overlap import opposite
 from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.surface import Surface
 
@@ -26,7 +26,7 @@ def test_the_region_of_two_planes_does_not_depend_on_their_triangles(n, m):
     """Between the x axis, the line x = 50 and the turned axis there is a triangle: the rectangles reach beyond it."""
     upper, lower = lattice(n, 50, 25, 0.0), lattice(m, 80, 60, -np.pi / 2 + 0.4)
     upper.invert()
-    region = opposite(Surface(upper), Surface(lower), 1.0).triangles
+    region, _ = opposite(Surface(upper), Surface(lower), 1.0)
     corners = np.array([(0, 0), (50, 0), (50, 50 * np.tan(0.4))])
     area, centre, second = polygon_moments(corners)
     middles, areas = region.mean(axis=1), trimesh.triangles.area(region)

@@ -63,13 +63,15 @@ _cache: dict[State | None, Product] = {}
 def read_files(geometries: Iterable[Geometry], limits: ReadingLimits = DEFAULT_LIMITS) -> Contents:
     """Return the content or the fault of each file that the geometries name. Each file is read once."""
     contents: dict[Key, Content | GeometryFault] = {}
+    files = (key_of(mesh) for mesh in geometries if isinstance(mesh, Mesh) and isinstance(mesh.source, str | Path))
     with taken() as worker:
-        for geometry in geometries:
-            if isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path) and key_of(geometry) not in contents:
-                key = key_of(geometry)
-                state = _state(*key, limits)  # before the file is read, since it may change meanwhile
-                contents[key] = content = _cache.get(state) or _content(*key, limits, worker)
-                _remember(state, content)
+        for key in dict.fromkeys(files):
+            state = _state(*key, limits)  # before the file is read, since it may change meanwhile
+            contents[key] = content = _cache.get(state) or _content(*key, limits, worker)
+            if isinstance(content, Product) and state is not None:  # listing, declaring and discretizing bodies each require it
+                while len(_cache) >= CACHE_SIZE:
+                    _cache.pop(next(iter(_cache)), None)
+                _cache[state] = content
     return contents
 
 
@@ -85,14 +87,6 @@ def _state(path: Path, chord: float | None, limits: ReadingLimits) -> State | No
     except OSError:
         return None
     return str(path.absolute()), status.st_mtime_ns, status.st_ino, status.st_size, chord, limits
-
-
-def _remember(state: State | None, content: Content | GeometryFault) -> None:
-    """Keep the content of a STEP file, since listing, declaring and discretizing its bodies each require it."""
-    if isinstance(content, Product) and state is not None:
-        while len(_cache) >= CACHE_SIZE:
-            _cache.pop(next(iter(_cache)), None)
-        _cache[state] = content
 
 
 def _content(path: Path, chord: float | None, limits: ReadingLimits, worker: Worker) -> Content | GeometryFault:

@@ -88,20 +88,17 @@ def _stl_size(head: bytes) -> int:
 
 def _check_kind(path: Path, head: bytes) -> None:
     suffix = path.suffix.lower()
+    name = "STEP" if suffix in STEP else suffix[1:].upper()
+    expected = (b"ISO-10303-21",) if suffix in STEP else _SIGNATURES.get(suffix, ())
     start = head.removeprefix(BYTE_ORDER_MARK).lstrip()
     for beginning, content, advice in _BEGINNINGS:
-        expected = (b"ISO-10303-21",) if suffix in STEP else _SIGNATURES.get(suffix, ())
         if start[: len(beginning)].lower() == beginning.lower() and beginning not in expected:
-            raise GeometryFault(f'"{path}" is {content} by its content, not {_article(suffix)} file; {advice}')
+            article = "an" if name in ("STL", "OBJ") else "a"
+            raise GeometryFault(f'"{path}" is {content} by its content, not {article} {name} file; {advice}')
     if suffix in STEP and b"ISO-10303-21" not in head:
         raise GeometryFault(f'"{path}" is not a STEP file: it does not begin with ISO-10303-21; export it again')
     if suffix in (".ply", ".glb") and not start.startswith(_SIGNATURES[suffix]):
-        raise GeometryFault(f'"{path}" is not a {suffix[1:].upper()} file: it does not begin like one; export it again')
-
-
-def _article(suffix: str) -> str:
-    kind = "STEP" if suffix in STEP else suffix[1:].upper()
-    return f"an {kind}" if kind in ("STL", "OBJ") else f"a {kind}"
+        raise GeometryFault(f'"{path}" is not a {name} file: it does not begin like one; export it again')
 
 
 def _announced_triangles(path: Path, head: bytes, size: int) -> int:
@@ -159,8 +156,10 @@ def _check_step(path: Path) -> StepText:
     text = StepText(content)
     references = text.shape_files or (() if b"_SHELL" in content else text.documents)
     if references:
+        names = ", ".join(f'"{clipped(name, 60)}"' for name in references[:5])
+        names += f" and {len(references) - 5} more" if len(references) > 5 else ""
         raise GeometryFault(
-            f'"{path}" refers to other files for shapes ({_listed(references)}), which are not read; give the file of the part '
+            f'"{path}" refers to other files for shapes ({names}), which are not read; give the file of the part '
             "itself, or export it as one file without external references"
         )
     if b"END-ISO-10303-21" not in content:
@@ -170,8 +169,3 @@ def _check_step(path: Path) -> StepText:
             f'"{path}" is damaged: it holds the number {clipped(number, 40)}, which is not finite; export it again'
         )
     return text
-
-
-def _listed(names: tuple[str, ...]) -> str:
-    entries = ", ".join(f'"{clipped(name, 60)}"' for name in names[:5])
-    return entries + (f" and {len(names) - 5} more" if len(names) > 5 else "")

@@ -165,11 +165,7 @@ def stated_surface(entry: Mapping[str, Any] | None) -> AnalyticSurface | None:
 
 
 def credible(
-    vertices: np.ndarray,
-    faces: np.ndarray,
-    brep: np.ndarray,
-    surfaces: Sequence[AnalyticSurface | None],
-    max_distance: float,
+    vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, surfaces: Sequence[AnalyticSurface | None], max_distance: float
 ) -> list[AnalyticSurface | None]:
     """Return the surfaces of B-rep faces; None if a vertex of the face is more than `max_distance` [mm] off."""
     checked = list(surfaces)
@@ -181,11 +177,7 @@ def credible(
 
 
 def onto(
-    vertices: np.ndarray,
-    faces: np.ndarray,
-    brep: np.ndarray,
-    surfaces: Sequence[AnalyticSurface | None],
-    max_distance: float,
+    vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, surfaces: Sequence[AnalyticSurface | None], max_distance: float
 ) -> np.ndarray:
     """Return `vertices` (vertex, 3) [mm], each moved the shortest way onto all analytic surfaces that meet in it.
 
