@@ -7,9 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from tolcontact.compilation.conditioning import SOLUTION
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.functions import InterpretedFunction
-from tolcontact.compilation.outcome import SOLUTION
 from tolcontact.compilation.solver import Arrays, SolverChoice
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics.flexibility import Flexibility
-from tolcontact.mechanics.gap import Point, RowPoints
+from tolcontact.mechanics.gap import RowPoints
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.pose import ENTRIES, Pose
@@ -62,10 +62,6 @@ class Rows:
             return self
         compliance = ca.SX(ca.sparsify(ca.DM(np.diag(flexibility.C))))
         return replace(self, gaps=self.gaps + flexibility.opening, compliance=compliance, flexibility=flexibility, bent=bent)
-
-    def opened(self, reactions: ca.SX) -> ca.SX:
-        """Return the gaps (row, 1) [mm] under reactions (row, 1) [N], at z = 0."""
-        return self.gaps + (self.compliance * reactions if self.bent is None else self.bent)
 
 
 def springs_of(compliance: ca.SX) -> list[int]:
@@ -143,26 +139,18 @@ def spring_energy(system: GroupEquations, points_of_pairs: Sequence[RowPoints], 
     return energy
 
 
-def compliance_of(pair: ContactPoints) -> np.ndarray:
-    """Return the compliance (point,) [mm/N] of the points of a pair."""
-    return np.zeros(len(pair.P_m)) if pair.stiffness is None else 1 / pair.stiffness
-
-
 def row_points(system: GroupEquations, standing: Sequence[np.ndarray | int], inputs: Mapping[str, ca.SX]) -> list[RowPoints]:
     """Return the points of the group's pairs that have rows, see contact_qp for `standing` and `inputs`."""
-    slots, bends = slot_points(inputs), iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
+    columns = (ca.horzsplit(values) for values in (inputs["P_m"], inputs["P_r"], inputs["n_r"], inputs["filled"].T))
+    slots = zip(*columns, strict=True)
+    bends = iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
     points_of_pairs = []
     for index, points in zip(system.group.pairs, standing, strict=True):
         pair = system.nominal.pairs[index]
         if isinstance(points, int):
             points_of_pairs.append(RowPoints(list(itertools.islice(slots, points)), ca.SX.zeros(points), next(bends)))
         else:
+            compliance = np.zeros(len(pair.P_m)) if pair.stiffness is None else 1 / pair.stiffness
             rows = pair_gaps(pair).points(points, system.deviations)
-            points_of_pairs.append(RowPoints(rows, ca.SX(ca.DM(compliance_of(pair)[points]))))
+            points_of_pairs.append(RowPoints(rows, ca.SX(ca.DM(compliance[points]))))
     return points_of_pairs
-
-
-def slot_points(inputs: Mapping[str, ca.SX]) -> Iterator[Point]:
-    """Return the points in the slots."""
-    columns = (ca.horzsplit(values) for values in (inputs["P_m"], inputs["P_r"], inputs["n_r"], inputs["filled"].T))
-    return iter(zip(*columns, strict=True))

@@ -26,9 +26,9 @@ class ContactSolver:
     def __init__(self, qp: ContactQP, choice: SolverChoice) -> None:
         self._qp, self._choice = qp, choice
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
-        self._kernel = None if qp.elastic is None else SOLVERS["graph"].solver(qp)
+        self._kernel = None if qp.flexibility is None else SOLVERS["graph"].solver(qp)
         h, a = (qp.assemble.sparsity_out(name) for name in ("h", "a"))
-        self._order = band_order(h, a, slacks=qp.slacks) if qp.elastic is None else np.zeros(0, dtype=int)
+        self._order = band_order(h, a, slacks=qp.slacks) if qp.flexibility is None else np.zeros(0, dtype=int)
         self._equalities = np.arange(a.size1() - qp.equations, a.size1())
         self._max_dense = max(MAX_DENSE_ENTRIES // (sum(a.shape) + qp.slacks) ** 2, 1)
         self._start_with(choice.solver(qp))
@@ -170,10 +170,11 @@ class ContactSolver:
 
     def _finished(self, arrays: Arrays) -> Arrays:
         """Return the outputs of `finish`; elastic parts bend by the reactions, and rows in conflict are `opened`."""
-        elastic, size = self._qp.elastic, self._qp.assemble.size1_out("h")
-        if elastic is not None:
-            bent = elastic.flexibility.bent(elastic.reactions(arrays["lam_a"], arrays["length"]))
-            bent += arrays.get("opened", 0)
+        flexibility, size = self._qp.flexibility, self._qp.assemble.size1_out("h")
+        if flexibility is not None:
+            length = arrays["length"]
+            reactions = -arrays["lam_a"][:, : length.shape[1]] / length * self._qp.scale
+            bent = flexibility.bent(reactions) + arrays.get("opened", 0)
             arrays = arrays | {"bent": bent, "x": arrays["x"][:, :size], "lam_x": arrays["lam_x"][:, :size]}
         outputs = self._finish(**arrays)
         if "opened" in arrays:

@@ -1,17 +1,43 @@
 """The objective of a contact QP to second order in the increments, and the additional terms of Newton steps."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from tolcontact.compilation.calls import Call
 from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS, Motion, linear, quadratic
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.objective import energy, proximity
 from tolcontact.mechanics.pose import Pose
 from tolcontact.mechanics.symmetric_products import congruent
+
+Expression = Callable[..., Sequence[ca.SX]]
+# How expressions are evaluated: `call(name, expression, *arguments, kind=...)` returns the results. Expressions of the same
+# name and kind, for arguments of the same sparsity, differ only in their arguments.
+Call = Callable[..., Sequence[ca.SX]]
+
+
+def inline(name: str, expression: Expression, *arguments: ca.SX, kind: Hashable = ()) -> Sequence[ca.SX]:
+    """Return the results of an expression as a part of the expressions of its arguments."""
+    del name, kind
+    return expression(*arguments)
+
+
+class FunctionCalls:
+    """Calls of Functions, one for all expressions that are the same: results do not contain their instructions."""
+
+    def __init__(self) -> None:
+        self._functions: dict[Hashable, ca.Function] = {}
+
+    def __call__(self, name: str, expression: Expression, *arguments: ca.SX, kind: Hashable = ()) -> Sequence[ca.SX]:
+        """Return the results."""
+        key = name, kind, *(tuple(argument.sparsity().compress()) for argument in arguments)
+        if key not in self._functions:
+            symbols = [ca.SX.sym(f"i{k}", argument.sparsity()) for k, argument in enumerate(arguments)]
+            self._functions[key] = ca.Function(name, symbols, expression(*symbols))
+        never_inline = True
+        return self._functions[key].call([*arguments], False, never_inline)  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +90,9 @@ def quadratic_terms(
     # The augmented Lagrangian term of the active rows does not change the answer, and restores convexity in most cases.
     penalty = (1 + 2 * load / goal.scale / system.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
     curvature += congruent(ca.diag(penalty), rows.slopes)
-    row_values = rows.opened(reactions)
+    opened = rows.gaps + (rows.compliance * reactions if rows.bent is None else rows.bent)  # [mm] at z = 0
     proximal_hessian = system.curvature(proximity(system, motion.poses, moved)) / system.group.length if projects else nothing
-    return QuadraticTerms(Q, gradient, curvature, rows.slopes.T @ (penalty * row_values), proximal_hessian, goal.scale)
+    return QuadraticTerms(Q, gradient, curvature, rows.slopes.T @ (penalty * opened), proximal_hessian, goal.scale)
 
 
 def _lagrangian_hessian(system: GroupEquations, poses: Sequence[Pose], bends: ca.SX) -> ca.SX:
@@ -79,9 +105,5 @@ def _lagrangian_hessian(system: GroupEquations, poses: Sequence[Pose], bends: ca
 def is_convex(Q: ca.SX, call: Call) -> ca.SX:
     """Return 1 if the diagonal blocks of Q are positive definite, else 0; a NaN pivot gives 0, too."""
     blocks = (Q[k : k + FREEDOMS, k : k + FREEDOMS] for k in range(0, Q.size1(), FREEDOMS))
-    pivots = ca.vertcat(*(call("pivots", _pivots, block)[0] for block in blocks))
+    pivots = ca.vertcat(*(call("pivots", lambda block: [ca.diag(ca.chol(ca.densify(block)))], block)[0] for block in blocks))
     return ca.mmin(ca.if_else(pivots > 0, 1, 0))
-
-
-def _pivots(block: ca.SX) -> list[ca.SX]:
-    return [ca.diag(ca.chol(ca.densify(block)))]

@@ -13,13 +13,12 @@ from tests.helpers import compiled, nightly
 from tests.units.compilation.recompiling import recompiled
 from tolcontact.code_cache import cache_folder
 from tolcontact.compilation import contact_qp, contact_rows
-from tolcontact.compilation.calls import inline
 from tolcontact.compilation.functions import InterpretedFunction
 from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
 from tolcontact.compilation.functions.native import NativeFunction
 from tolcontact.compilation.functions.operations import OPERATIONS
 from tolcontact.compilation.functions.translation import UnknownInstructionError
-from tolcontact.compilation.quadratic_terms import is_convex
+from tolcontact.compilation.quadratic_terms import inline, is_convex
 from tolcontact.discretization import discretize
 from tolcontact.mechanics.groups import contact_groups
 from tolcontact.mechanics.pair_gaps import pair_gaps

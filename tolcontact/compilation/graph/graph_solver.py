@@ -28,7 +28,7 @@ class GraphChoice(SolverChoice):
         return True
 
     def solver(self, qp: ContactQP) -> "GraphSolver | ElasticSolver":
-        if qp.elastic is not None:
+        if qp.flexibility is not None:
             return ElasticSolver(qp)
         sparsities = {name: qp.sparsity(name) for name in ("h", "g", "a", "lba")}
         return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations)
