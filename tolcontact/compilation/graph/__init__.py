@@ -9,9 +9,8 @@ depend on other realizations.
 layout                the bodies that a row touches, and the elimination orders, from the sparsity, once
 factor_kernel         the Gram matrix of the active rows
 active_set_kernel     changes of the active set: rows enter and leave, slacks open and close
-search_kernel         the search for the active set: in all joints at once, then one by one
 hessian_kernel        the factor of H
-solve_kernel          a batch of QPs
+solve_kernel          a batch of QPs: the search for the active set, in all joints at once, then one by one
 graph_solver          the solver, and its entry in the table of solvers
 """
 

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.arrays import Array, Bool, Float
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.elastic_solver import ElasticSolver
 from tolcontact.compilation.graph.factor_kernel import Work
-from tolcontact.compilation.graph.layout import POSITION, Layout, Storage, layout
+from tolcontact.compilation.graph.layout import Layout, layout
 from tolcontact.compilation.graph.solve_kernel import solve_batch
 from tolcontact.compilation.solver import Arrays, SolverChoice
 from tolcontact.mechanics.correction import FREEDOMS
@@ -17,7 +17,7 @@ from tolcontact.mechanics.correction import FREEDOMS
 FEW_BODIES, ROUNDS_OF_FEW, ROUNDS = 2, 4, 40  # rounds of all joints at once
 STEPS_PER_ROW = 4  # steps of single rows
 
-Layouts = dict[bool, tuple[Layout, Storage]]  # by whether H couples bodies
+Layouts = dict[bool, Layout]  # by whether H couples bodies
 
 
 class GraphChoice(SolverChoice):
@@ -52,9 +52,8 @@ class GraphSolver:
         self._sparsities, self._slacks, self._equations = dict(sparsities), slacks, equations
         rows, columns = (np.array(indices) for indices in sparsities["h"].get_triplet())
         self._identity = (rows == columns).astype(float)
-        self._is_full = {name: sparsities[name].nnz() == sparsities[name].numel() for name in ("g", "lba")}
         self._nonzeros = {name: np.array(sparsities[name].find()) for name in ("g", "lba")}
-        self._searches: dict[bool, _Search] = {}
+        self._buffers: dict[bool, tuple[Work, np.ndarray, np.ndarray]] = {}
 
     def __call__(
         self, problem: Arrays, reactions: Float[Array, "realization row"], slacks: Float[Array, "realization slack"]
@@ -65,91 +64,80 @@ class GraphSolver:
         """
         count = len(reactions)
         assert slacks.shape == (count, self._slacks)  # otherwise machine code would read out of bounds
-        answer = {name: np.zeros((count, size)) for name, size in self._sizes().items()}
+        rows, size = self._sparsities["a"].shape
+        answer = {name: np.zeros((count, entries)) for name, entries in (("x", size), ("lam_a", rows), ("lam_x", size))}
         failed = np.zeros(count, dtype=np.bool_)
         arrays = (problem["h"], problem["a"], self._full("g", problem["g"]), self._full("lba", problem["lba"]))
         guess, results = (reactions, slacks), (*answer.values(), failed)
         coupled = (problem["h"] != self._identity).any(axis=1)
         for is_coupled in (False, True):
-            rows = np.flatnonzero(coupled == is_coupled)
-            if len(rows) == count:
-                self._search(is_coupled)(arrays, guess, results)
-            elif rows.size:
-                part, part_guess, part_results = (tuple(array[rows] for array in group) for group in (arrays, guess, results))
-                self._search(is_coupled)(part, part_guess, part_results)
-                for array, values in zip(results, part_results, strict=True):
-                    array[rows] = values
+            members = np.flatnonzero(coupled == is_coupled)
+            if len(members) == count:
+                self._solve(is_coupled, arrays, guess, results)
+            elif members.size:
+                parts = [tuple(array[members] for array in group) for group in (arrays, guess, results)]
+                self._solve(is_coupled, *parts)
+                for array, values in zip(results, parts[2], strict=True):
+                    array[members] = values
         return answer, failed
 
     def twin(self) -> "GraphSolver":
         """Return an equal solver with buffers of its own."""
         return GraphSolver(self._sparsities, slacks=self._slacks, equations=self._equations, layouts=self._layouts)
 
-    def _sizes(self) -> dict[str, int]:
-        rows, size = self._sparsities["a"].shape
-        return {"x": size, "lam_a": rows, "lam_x": size}
-
     def _full(self, name: str, stored: np.ndarray) -> np.ndarray:
         """Return all entries of a vector, (realization, entry)."""
-        if self._is_full[name]:
+        size = self._sparsities[name].numel()
+        if stored.shape[1] == size:
             return stored
-        entries = np.zeros((len(stored), self._sparsities[name].numel()))
+        entries = np.zeros((len(stored), size))
         entries[:, self._nonzeros[name]] = stored
         return entries
 
-    def _search(self, coupled: bool) -> "_Search":
-        if coupled not in self._searches:
-            if coupled not in self._layouts:
-                sparsities = self._sparsities["h"], self._sparsities["a"]
-                self._layouts[coupled] = layout(*sparsities, slacks=self._slacks, equations=self._equations, coupled=coupled)
-            self._searches[coupled] = _Search(*self._layouts[coupled], coupled=coupled)
-        return self._searches[coupled]
-
-
-class _Search:
-    """The layout of QPs, with buffers for their solution; `coupled` if H has off-diagonal blocks."""
-
-    def __init__(self, layout: Layout, storage: Storage, *, coupled: bool) -> None:
-        self._layout, self._storage, self._coupled = layout, storage, coupled
-        rows, width = len(layout.blocks), layout.blocks.shape[1] - 1
-        bodies, joints, positions = len(storage.bodies), len(layout.joints) - 1, int(layout.joints[-1, POSITION])
-        cut = rows * width * FREEDOMS
-        self._buffer = np.zeros(cut + 2 * rows)
-        self._work = Work(
-            slopes=self._buffer[:cut].reshape(rows, width, FREEDOMS),
-            rows=self._buffer[cut:].reshape(rows, 2),
-            position=np.zeros(rows, dtype=np.int64),
-            vectors=np.zeros((4, bodies, FREEDOMS)),
-            joints=np.zeros((joints, 4), dtype=np.int64),
-            slacks=np.zeros((3, joints)),
-            factor=np.zeros((positions, positions)),
-            active=np.zeros(positions, dtype=np.int64),
-            positions=np.zeros((3, positions)),
-        )
-        self._blocks = np.zeros((len(storage.columns) if coupled else 0, FREEDOMS, FREEDOMS))
-        self._guesses = np.zeros(joints), np.zeros(joints, dtype=np.int64)
-        self._limits = np.array(
-            [max(ROUNDS, bodies) if bodies > FEW_BODIES else ROUNDS_OF_FEW, STEPS_PER_ROW * (rows + FREEDOMS)]
-        )
-
-    def __call__(
-        self, problem: tuple[np.ndarray, ...], guess: tuple[np.ndarray, ...], answer: tuple[np.ndarray, ...]
-    ) -> Int[Array, "realization 2"]:
-        """Solve QPs (h, a, g, lba) into `answer` (x, lam_a, lam_x, failed); return the counters of `solve_batch`.
+    def _solve(
+        self, coupled: bool, problem: tuple[np.ndarray, ...], guess: tuple[np.ndarray, ...], answer: tuple[np.ndarray, ...]
+    ) -> None:
+        """Solve QPs (h, a, g, lba) into `answer` (x, lam_a, lam_x, failed); they are `coupled` if H has off-diagonal blocks.
 
         guess   reactions and slacks
         """
-        h, *vectors = (np.ascontiguousarray(array) for array in problem)
-        counters = np.zeros((len(h), 2), dtype=np.int64)
+        if coupled not in self._layouts:
+            h, a = self._sparsities["h"], self._sparsities["a"]
+            self._layouts[coupled] = layout(h, a, slacks=self._slacks, equations=self._equations, coupled=coupled)
+        arrays = self._layouts[coupled]
+        if coupled not in self._buffers:
+            self._buffers[coupled] = _buffers(arrays, coupled)
+        work, buffer, blocks = self._buffers[coupled]
+        rows, bodies, joints = len(work.bound), len(work.y), len(work.open)
+        rounds = max(ROUNDS, bodies) if bodies > FEW_BODIES else ROUNDS_OF_FEW
+        nonzeros, *vectors = (np.ascontiguousarray(array) for array in problem)
         solve_batch(
-            self._layout,
-            self._storage,
-            self._work,
-            (h if self._coupled else h[:, :0].copy(), self._blocks),
-            (*vectors, self._buffer),
+            arrays,
+            work,
+            (nonzeros if coupled else nonzeros[:, :0].copy(), blocks),
+            (*vectors, buffer),
             tuple(np.ascontiguousarray(array) for array in guess),
-            self._limits,
-            (*self._guesses, counters),
+            np.array([rounds, STEPS_PER_ROW * (rows + FREEDOMS)]),
+            (np.zeros(joints), np.zeros(joints, dtype=np.int64), np.zeros((len(nonzeros), 2), dtype=np.int64)),
             answer,
         )
-        return counters
+
+
+def _buffers(layout: Layout, coupled: bool) -> tuple[Work, np.ndarray, np.ndarray]:
+    """Return the numbers of one QP, the buffer of its slopes and openings, and the buffer (block, 6, 6) of the factor of H."""
+    rows, width, bodies = len(layout.blocks), layout.blocks.shape[1] - 1, len(layout.bodies)
+    joints, positions, cut = len(layout.slack), int(layout.first[-1]), rows * width * FREEDOMS
+    buffer = np.zeros(cut + rows)
+    work = Work(
+        slopes=buffer[:cut].reshape(rows, width, FREEDOMS),
+        opening=buffer[cut:],
+        bound=np.zeros(rows),
+        position=np.zeros(rows, dtype=np.int64),
+        **{name: np.zeros((bodies, FREEDOMS)) for name in ("gradient", "y", "scatter", "direction")},
+        **{name: np.zeros(joints, dtype=np.int64) for name in ("count", "fresh", "changed", "open")},
+        **{name: np.zeros(joints) for name in ("price", "value", "change")},
+        factor=np.zeros((positions, positions)),
+        active=np.zeros(positions, dtype=np.int64),
+        **{name: np.zeros(positions) for name in ("multiplier", "step", "column")},
+    )
+    return work, buffer, np.zeros((len(layout.columns) if coupled else 0, FREEDOMS, FREEDOMS))

@@ -45,14 +45,14 @@ def _subtract(block, left, right):  # type: ignore[no-untyped-def]
 
 
 @inner
-def load_hessian(storage, nonzeros, k, blocks):  # type: ignore[no-untyped-def]
+def load_hessian(layout, nonzeros, k, blocks):  # type: ignore[no-untyped-def]
     """Write the factor of problem k into `blocks`; return whether H is positive definite."""
     blocks[:] = 0.0
-    for entry in range(storage.hessian_entries.size):
-        if storage.hessian_entries[entry] >= 0:
-            block, offset = divmod(storage.hessian_entries[entry], 36)
+    for entry in range(layout.hessian_entries.size):
+        if layout.hessian_entries[entry] >= 0:
+            block, offset = divmod(layout.hessian_entries[entry], 36)
             blocks[block, offset // 6, offset % 6] = nonzeros[k, entry]
-    starts, columns, block_of = storage.starts, storage.columns, storage.block_of
+    starts, columns, block_of = layout.starts, layout.columns, layout.block_of
     for body in range(starts.size - 1):
         diagonal = starts[body + 1] - 1
         for b in range(starts[body], diagonal):
@@ -78,9 +78,9 @@ def _forward(triangle, vector):  # type: ignore[no-untyped-def]
 
 
 @inner
-def vectors_to_unit(storage, blocks, vectors):  # type: ignore[no-untyped-def]
+def vectors_to_unit(layout, blocks, vectors):  # type: ignore[no-untyped-def]
     """Multiply vectors (body, 6) by C^-1, in place."""
-    starts, columns = storage.starts, storage.columns
+    starts, columns = layout.starts, layout.columns
     for body in range(starts.size - 1):
         diagonal = starts[body + 1] - 1
         for b in range(starts[body], diagonal):
@@ -91,9 +91,9 @@ def vectors_to_unit(storage, blocks, vectors):  # type: ignore[no-untyped-def]
 
 
 @inner
-def from_unit(storage, blocks, vectors):  # type: ignore[no-untyped-def]
+def from_unit(layout, blocks, vectors):  # type: ignore[no-untyped-def]
     """Multiply vectors (body, 6) by C'^-1, in place."""
-    starts, columns = storage.starts, storage.columns
+    starts, columns = layout.starts, layout.columns
     for body in range(starts.size - 2, -1, -1):
         diagonal = starts[body + 1] - 1
         for i in range(5, -1, -1):
@@ -108,15 +108,15 @@ def from_unit(storage, blocks, vectors):  # type: ignore[no-untyped-def]
 
 
 @inner
-def rows_to_unit(bodies, storage, blocks, slopes):  # type: ignore[no-untyped-def]
-    """Multiply the slopes (row, block, 6) of all rows by C^-1, in place; `bodies` is Layout.blocks."""
-    starts = storage.starts
+def rows_to_unit(layout, blocks, slopes):  # type: ignore[no-untyped-def]
+    """Multiply the slopes (row, block, 6) of all rows by C^-1, in place."""
+    starts = layout.starts
     for row in range(slopes.shape[0]):
-        for q in range(bodies[row, 0]):
-            body = bodies[row, q + 1]
+        for q in range(layout.blocks[row, 0]):
+            body = layout.blocks[row, q + 1]
             _forward(blocks[starts[body + 1] - 1], slopes[row, q])
-            for p in range(q + 1, bodies[row, 0]):
-                b = storage.block_of[bodies[row, p + 1], body]
+            for p in range(q + 1, layout.blocks[row, 0]):
+                b = layout.block_of[layout.blocks[row, p + 1], body]
                 if b >= 0:
                     for i in range(6):
                         for c in range(6):

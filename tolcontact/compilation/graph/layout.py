@@ -11,39 +11,37 @@ import numpy as np
 
 from tolcontact.mechanics.correction import FREEDOMS
 
-JOINT, SOURCE = range(2)  # columns of Layout.rows
-ROW, POSITION, PRIOR, SLACK = range(4)  # columns of Layout.joints
 Key = Callable[[int, Sequence[int], Sequence[set[int]]], tuple[int, ...]]
 
 
 class Layout(NamedTuple):
-    """Constant arrays for the active-set search. Bodies, joints and rows are numbered in elimination order.
+    """Constant arrays for the solution of QPs. Bodies, joints and rows are numbered in elimination order.
 
-    blocks   (row, 1 + block) number of bodies that the row touches, and these bodies, in ascending order
-    rows     (row, 2) the joint of the row, and its index in the QP; the rows of a joint are consecutive
-    joints   (joint + 1, 4) the first row of the joint, its first position in the Gram matrix of the active rows, its first row
-             of `prior`, and its slack, or -1 for equations
-    prior    (_, 2) earlier joints that share entries of the Gram factor with the joint, and whether the two share a body, so
-             that the Gram matrix has entries, too
+    blocks      (row, 1 + block) number of bodies that the row touches, and these bodies, in ascending order
+    joint       (row,) the joint of the row; the rows of a joint are consecutive
+    source      (row,) its index in the QP
+    row         (joint + 1,) the first row of the joint
+    first       (joint + 1,) its first position in the Gram matrix of the active rows
+    slack       (joint,) its slack, or -1 for equations
+    prior_start (joint + 1,) its first row of `prior`
+    prior       (_, 2) earlier joints that share entries of the Gram factor with the joint, and whether the two share a body, so
+                that the Gram matrix has entries, too
+    bodies      (body,) index of each body in the QP
+    entries     (nonzero of a) offset of each nonzero in a buffer: slopes (row, block, 6), then openings (row,)
+    hessian_entries (nonzero of h) offset of each nonzero in the lower triangular blocks (block, 6, 6) of H, or -1
+    starts      (body + 1,) first block of each body's row; its last block is on the diagonal
+    columns     (block,) body of each block's column
+    block_of    (body, body) block of a row and column, or -1
     """
 
     blocks: np.ndarray
-    rows: np.ndarray
-    joints: np.ndarray
+    joint: np.ndarray
+    source: np.ndarray
+    row: np.ndarray
+    first: np.ndarray
+    slack: np.ndarray
+    prior_start: np.ndarray
     prior: np.ndarray
-
-
-class Storage(NamedTuple):
-    """The storage of the entries of a QP.
-
-    bodies          (body,) index of each body in the QP
-    entries         (nonzero of a) offset of each nonzero in a buffer: slopes (row, block, 6), then openings and bounds (row, 2)
-    hessian_entries (nonzero of h) offset of each nonzero in the lower triangular blocks (block, 6, 6) of H, or -1
-    starts          (body + 1,) first block of each body's row; its last block is on the diagonal
-    columns         (block,) body of each block's column
-    block_of        (body, body) block of a row and column, or -1
-    """
-
     bodies: np.ndarray
     entries: np.ndarray
     hessian_entries: np.ndarray
@@ -52,8 +50,8 @@ class Storage(NamedTuple):
     block_of: np.ndarray
 
 
-def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupled: bool) -> tuple[Layout, Storage]:
-    """Return the layout and the storage of QPs with these sparsities.
+def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupled: bool) -> Layout:
+    """Return the layout of QPs with these sparsities.
 
     If `coupled`, H = C C' has off-diagonal blocks. Rows become C^-1 a, which also touches the bodies that follow in the factor.
     """
@@ -81,15 +79,20 @@ def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupl
     blocks = [sorted(int(body_rank[body]) for body in touched[row]) for row in row_order]
     width = max([1, *map(len, blocks)])
     sizes = [len(joints[j]) if j < equation_joints else min(len(joints[j]), FREEDOMS * len(joint_bodies[j]) + 2) for j in order]
-    positions = np.cumsum([0, *sizes])
-    slack_of_joint = [*(slack_of_row[rows_of_joint[0]] for rows_of_joint in members), -1]
     prior_joints = [(k, order[k] in adjacent[order[j]]) for j, nodes in enumerate(prior) for k in nodes]
     return Layout(
         blocks=np.array([[len(nodes), *nodes] + [0] * (width - len(nodes)) for nodes in blocks], dtype=np.int64),
-        rows=np.stack([np.repeat(np.arange(len(order)), list(map(len, members))), row_order], axis=1),
-        joints=np.stack([_starts(members), positions, _starts(prior), slack_of_joint], axis=1),
+        joint=np.repeat(np.arange(len(order)), list(map(len, members))),
+        source=row_order,
+        row=_starts(members),
+        first=np.cumsum([0, *sizes]),
+        slack=np.array([slack_of_row[rows_of_joint[0]] for rows_of_joint in members], dtype=np.int64),
+        prior_start=_starts(prior),
         prior=np.array(prior_joints, dtype=np.int64).reshape(-1, 2),
-    ), _storage(h, body_order, later, _entries(rows, columns, np.argsort(row_order), body_rank, blocks, width))
+        bodies=np.array(body_order, dtype=np.int64),
+        entries=_entries(rows, columns, np.argsort(row_order), body_rank, blocks, width),
+        **_hessian_blocks(h, body_rank, later),
+    )
 
 
 def _starts(lists: Sequence[Sequence[int] | set[int]]) -> np.ndarray:
@@ -137,14 +140,15 @@ def _entries(
     for k, (row, column) in enumerate(zip(row_rank[rows].tolist(), columns.tolist(), strict=True)):
         body, freedom = divmod(column, FREEDOMS)
         if body >= len(body_rank):
-            offsets[k] = openings + 2 * row
+            offsets[k] = openings + row
         else:
             offsets[k] = (row * width + blocks[row].index(int(body_rank[body]))) * FREEDOMS + freedom
     return offsets
 
 
-def _storage(h: ca.Sparsity, order: Sequence[int], later: Sequence[Sequence[int]], entries: np.ndarray) -> Storage:
-    bodies, rank = len(order), np.argsort(order)
+def _hessian_blocks(h: ca.Sparsity, rank: np.ndarray, later: Sequence[Sequence[int]]) -> dict[str, np.ndarray]:
+    """Return the arrays of a layout for the blocks of H, by name."""
+    bodies = len(rank)
     columns = [[*(k for k, nodes in enumerate(later) if body in nodes), body] for body in range(bodies)]
     starts = _starts(columns)
     block_of = np.full((bodies, bodies), -1, dtype=np.int64)
@@ -156,14 +160,8 @@ def _storage(h: ca.Sparsity, order: Sequence[int], later: Sequence[Sequence[int]
     i, j = rows_of_h[of_bodies], columns_of_h[of_bodies]
     blocks = block_of[rank[i // FREEDOMS], rank[j // FREEDOMS]]
     offsets[of_bodies] = np.where(blocks < 0, -1, (blocks * FREEDOMS + i % FREEDOMS) * FREEDOMS + j % FREEDOMS)
-    return Storage(
-        bodies=np.array(order, dtype=np.int64),
-        entries=entries,
-        hessian_entries=offsets,
-        starts=starts,
-        columns=np.array([k for nodes in columns for k in nodes], dtype=np.int64),
-        block_of=block_of,
-    )
+    order = np.array([k for nodes in columns for k in nodes], dtype=np.int64)
+    return {"hessian_entries": offsets, "starts": starts, "columns": order, "block_of": block_of}
 
 
 def least_degree(node: int, depths: Sequence[int], neighbours: Sequence[set[int]]) -> tuple[int, ...]:
