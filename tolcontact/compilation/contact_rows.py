@@ -69,12 +69,14 @@ def springs_of(compliance: ca.SX) -> list[int]:
     return [k for k in range(compliance.numel()) if not compliance[k].is_zero()]
 
 
-def standing_points(pair: ContactPoints, gaps: Any, method: Method) -> np.ndarray | int:
+def standing_points(pair: ContactPoints, gaps: Any, method: Method, *, is_searched: bool = False) -> np.ndarray | int:
     """Return the points of a pair that always have a row, or the number of its slots for changing points.
 
-    Points that follow from every pose always have a row. The same holds for points that can be the deepest, if they are few and
-    fixed.
+    Points that follow from every pose always have a row, unless they are searched at every pose. The same holds for points that
+    can be the deepest, if they are few and fixed.
     """
+    if is_searched:
+        return MANY_SLOTS if pair.has_form else SLOTS
     if not pair.samples_faces or pair.is_springy:
         return np.arange(len(pair.P_m))
     are_few = method.is_closed and len(gaps.corners) <= MANY_SLOTS and pair.minima is None

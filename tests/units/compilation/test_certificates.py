@@ -7,8 +7,8 @@ import numpy as np
 from tests import cases
 from tests.helpers import PAPER, joined, simulate
 from tests.units.compilation.recompiling import recompiled
-from tolcontact.compilation.active_set import ActiveSet
-from tolcontact.compilation.conic_plugin import Plugin
+from tolcontact.compilation.contact_solver import ActiveSet
+from tolcontact.compilation.solvers import Plugin
 from tolcontact.simulation import simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 

@@ -13,7 +13,7 @@ import numpy as np
 from tolcontact import code_cache
 from tolcontact.arrays import Array, Float, Real
 from tolcontact.compilation.functions.native import NativeFunction, key_of
-from tolcontact.compilation.functions.translation import UnknownInstructionError, called
+from tolcontact.compilation.functions.translation import called
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
@@ -40,15 +40,12 @@ class InterpretedFunction:
 
         Outputs are NaN if the evaluation failed.
         """
-        with quiet():  # plugins may print in every evaluation
-            return self._evaluated(inputs)
-
-    def _evaluated(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
         count = len(inputs[0])
-        results = [np.empty((count, size)) for size in self._sizes_out]
-        failed = np.zeros(count, dtype=bool)
-        for call, start, stop in self._batches(count):
-            if not self._succeeds(call, slice(start, stop), inputs, results):
+        results, failed = [np.empty((count, size)) for size in self._sizes_out], np.zeros(count, dtype=bool)
+        with quiet():  # plugins may print in every evaluation
+            for call, start, stop in self._batches(count):
+                if self._succeeds(call, slice(start, stop), inputs, results):
+                    continue
                 # A plugin that fails on one realization may end the whole call (qpOASES does), so each is evaluated alone.
                 for k in range(start, stop):
                     if not self._succeeds(self._calls[-1], slice(k, k + 1), inputs, results):
@@ -65,9 +62,7 @@ class InterpretedFunction:
         start = 0
         while start < count:
             remaining = 1 if self._is_new else count - start
-            call = (
-                self._calls[0] if remaining >= WIDTHS[0] else self._calls[1] if remaining >= WIDTHS[1] // 2 else self._calls[2]
-            )
+            call = self._calls[0 if remaining >= WIDTHS[0] else 1 if remaining >= WIDTHS[1] // 2 else 2]
             stop = min(start + call.width, count)
             yield call, start, stop
             start = stop
@@ -135,19 +130,6 @@ MIN_COMPILED_CALLS = 10_000
 MAX_INSTRUCTIONS = 300_000  # that are compiled; more are interpreted, since compiling them takes more than a gigabyte
 
 
-class Evaluations:
-    """The number of evaluations of a Function by this process and by earlier processes that stored it."""
-
-    def __init__(self, key: str) -> None:
-        self._key = f"{key}-evaluations"
-        stored = code_cache.load(self._key) or b""
-        self.number = int(stored) if stored.isdigit() else 0
-
-    def store(self) -> None:
-        """Store the number for later processes."""
-        code_cache.write(self._key, str(self.number).encode())
-
-
 def _instructions(function: ca.Function) -> tuple[int, int]:
     """Return the number of instructions that have to be compiled, and that an evaluation executes."""
     calls = [(f.__hash__(), *_instructions(f)) for f in called(function)]
@@ -172,7 +154,7 @@ class NamedFunction:
         compiled, executed = _instructions(function)
         self._may_be_compiled = compiled <= MAX_INSTRUCTIONS
         self._min_calls = MIN_COMPILED_CALLS * compiled // max(executed, 1)
-        self._evaluations: Evaluations | None = None
+        self._evaluations: list[int] | None = None  # the number of evaluations by this process and by earlier ones
         self._lock = threading.Lock()
 
     @classmethod
@@ -203,7 +185,7 @@ class NamedFunction:
     def _compiled(self, count: int) -> NativeFunction | None:
         """Return the machine code for `count` more evaluations, or None while CasADi interprets the Function."""
         # CasADi interprets a Function that LLVM cannot compile on this machine.
-        with contextlib.suppress(UnknownInstructionError, RuntimeError):
+        with contextlib.suppress(RuntimeError):
             if self.native is None and self._is_due(count):
                 self.native = NativeFunction(self.function)  # other threads interpret meanwhile
         return self.native
@@ -218,10 +200,12 @@ class NamedFunction:
                 self.native = NativeFunction.from_cache(self.function, key)
                 if self.native is not None:
                     return False
-                self._evaluations = Evaluations(key)
-                weakref.finalize(self, self._evaluations.store)
-            self._evaluations.number += count
-            self._may_be_compiled = self._evaluations.number <= self._min_calls
+                name = f"{key}-evaluations"
+                stored = code_cache.load(name) or b""
+                self._evaluations = [int(stored) if stored.isdigit() else 0]
+                weakref.finalize(self, lambda number: code_cache.write(name, str(*number).encode()), self._evaluations)
+            self._evaluations[0] += count
+            self._may_be_compiled = self._evaluations[0] <= self._min_calls
             return not self._may_be_compiled
 
 
