@@ -21,7 +21,7 @@ from tolcontact.geometry import known_surfaces, surface_arrays
 from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, coordinate_spacing
 from tolcontact.mechanics.displacement import central_moments
 from tolcontact.simulation.bodies import locator_variations
-from tolcontact.simulation.other_objectives import compared_objectives, empty_by_objective
+from tolcontact.simulation.run_checks import compared_objectives, empty_by_objective
 from tolcontact.vocabulary import ArchiveVariable
 
 

@@ -11,8 +11,7 @@ import typer
 
 from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
-from tolcontact.cli.output import check_outputs
-from tolcontact.cli.progress import waiting
+from tolcontact.cli.output import check_outputs, waiting
 from tolcontact.cli.step_files import without_annotations
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP

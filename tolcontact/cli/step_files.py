@@ -18,8 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tolcontact.cli.app import AsJson, StepFile, app, echo, examples, flag, only_one
-from tolcontact.cli.output import console
-from tolcontact.cli.progress import waiting
+from tolcontact.cli.output import console, waiting
 from tolcontact.errors import OptionError
 from tolcontact.geometry import bodies_in, faces_in, group_lines
 from tolcontact.geometry.step_listing import FacesOfRecords

@@ -9,8 +9,7 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Int
-from tolcontact.compilation.contact_rows import Rows
-from tolcontact.compilation.quadratic_terms import Call
+from tolcontact.compilation.qp_terms import Call, Rows
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.placement import misfit

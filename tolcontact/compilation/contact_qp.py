@@ -18,10 +18,17 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.compilation.conditioning import conditioned, outcome
-from tolcontact.compilation.contact_rows import contact_rows, row_points, spring_energy
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.pair_terms import is_summed, summed_terms
-from tolcontact.compilation.quadratic_terms import Call, FunctionCalls, inline, quadratic_terms
+from tolcontact.compilation.qp_terms import (
+    Call,
+    FunctionCalls,
+    contact_rows,
+    inline,
+    quadratic_terms,
+    row_points,
+    spring_energy,
+)
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS, linear, published, rigid
 from tolcontact.mechanics.displacement import MOMENTS

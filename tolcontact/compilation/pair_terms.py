@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from tolcontact.compilation.contact_rows import Rows, contact_rows, relative_poses
-from tolcontact.compilation.quadratic_terms import Call, QuadraticTerms, quadratic_terms
+from tolcontact.compilation.qp_terms import Call, QuadraticTerms, Rows, contact_rows, quadratic_terms, relative_poses
 from tolcontact.mechanics.correction import FREEDOMS, Motion, linear
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap import RowPoints

@@ -11,10 +11,10 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation.contact_qp import ContactQP, Standing, contact_qp, row_count
-from tolcontact.compilation.contact_rows import standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.method_checks import check_forces, check_method
+from tolcontact.compilation.qp_terms import standing_points
 from tolcontact.compilation.solver import SolverChoice
 from tolcontact.compilation.solvers import solver_choice
 from tolcontact.compilation.station_program import StationProgram, station_programs

@@ -16,16 +16,15 @@ from tolcontact.compilation import Program
 from tolcontact.errors import OptionError, check_choice
 from tolcontact.method import Solver
 from tolcontact.replacing import check_identities
-from tolcontact.simulation import block_rows, other_objectives
+from tolcontact.simulation import block_rows
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
-from tolcontact.simulation.surfaces import check_surfaces, simulated_poses, warn_of
+from tolcontact.simulation.run_checks import COMPARED_ROWS, MIN_COMPARED, by_objective, check_surfaces, simulated_poses, warn_of
 from tolcontact.statistics import STATISTICS, estimate_of
 from tolcontact.statistics.measure_statistics import HALF_WIDTH, StatisticRequest
 from tolcontact.temporary import temporary_folder
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, OBJECTIVES_GROUP, OUTSIDE, PLANS, PPM, FieldChoice, Kept, Plan
 from tolcontact.workflow.accessor import Results
-from tolcontact.workflow.forecast import announce
-from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
+from tolcontact.workflow.models import Choice, Model, announce, check_counts, check_program, program_of
 from tolcontact.workflow.run_sums import BlockTotals, RunSums
 
 MIN_GROWTH, MAX_GROWTH = 1.25, 16.0
@@ -257,9 +256,9 @@ def _simulate(
                     progress(writer.rows)
         with writer.completed(sums.groups):
             _check(program, writer, seed)
-            if writer.rows >= other_objectives.MIN_REALIZATIONS and not writer.has_objectives():
-                first = writer.first_outcomes(other_objectives.ROWS)
-                writer.write_group(OBJECTIVES_GROUP, other_objectives.by_objective(program, *first, blocks, seed))
+            if writer.rows >= MIN_COMPARED and not writer.has_objectives():
+                first = writer.first_outcomes(COMPARED_ROWS)
+                writer.write_group(OBJECTIVES_GROUP, by_objective(program, *first, blocks, seed))
     except BaseException:
         if writer.has_new_rows:
             if writer.is_between_blocks:

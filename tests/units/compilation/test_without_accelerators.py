@@ -17,7 +17,7 @@ from tests.helpers import compiled, nightly
 from tolcontact.compilation import ContactGroup, NamedFunction
 from tolcontact.compilation.contact_qp import ContactQP, Evaluators, contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
-from tolcontact.compilation.quadratic_terms import inline
+from tolcontact.compilation.qp_terms import inline
 from tolcontact.compilation.solver import SolverChoice
 from tolcontact.compilation.solvers import SOLVERS
 from tolcontact.mechanics import GapMap

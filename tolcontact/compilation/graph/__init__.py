@@ -7,9 +7,8 @@ others, its block Cholesky factor first transforms the rows. Each realization is
 depend on other realizations.
 
 layout                the bodies that a row touches, and the elimination orders, from the sparsity, once
-factor_kernel         the Gram matrix of the active rows
+factor_kernel         the factors of the Gram matrix of the active rows, and of H
 active_set_kernel     changes of the active set: rows enter and leave, slacks open and close
-hessian_kernel        the factor of H
 solve_kernel          a batch of QPs: the search for the active set, in all joints at once, then one by one
 graph_solver          the solver, and its entry in the table of solvers
 """

@@ -22,8 +22,16 @@ from tolcontact.compilation.graph.active_set_kernel import (
     scan,
     step_towards,
 )
-from tolcontact.compilation.graph.factor_kernel import any_open, append, factorize, has_position
-from tolcontact.compilation.graph.hessian_kernel import from_unit, load_hessian, rows_to_unit, vectors_to_unit
+from tolcontact.compilation.graph.factor_kernel import (
+    any_open,
+    append,
+    factorize,
+    from_unit,
+    has_position,
+    load_hessian,
+    rows_to_unit,
+    vectors_to_unit,
+)
 from tolcontact.compiled import inlined_inner, uncounted
 
 JOINTS, RELEASE, ROWS = range(3)  # phases: all joints at once; drop rows with negative multipliers; single rows

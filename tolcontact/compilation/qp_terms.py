@@ -1,7 +1,7 @@
-"""Rows of the contact QP: the gaps of contact points, to first order in the increments."""
+"""The terms of a contact QP: its rows, which are gaps to first order in the increments, and its objective to second order."""
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,14 +9,43 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import ContactPoints
+from tolcontact.mechanics.correction import FREEDOMS, Motion, linear, quadratic
 from tolcontact.mechanics.flexibility import Flexibility
 from tolcontact.mechanics.gap import RowPoints
 from tolcontact.mechanics.group_equations import GroupEquations
+from tolcontact.mechanics.objective import energy, proximity
 from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.pose import ENTRIES, Pose
+from tolcontact.mechanics.symmetric_products import congruent
 from tolcontact.method import Method
 
 SLOTS, MANY_SLOTS = 8, 12  # of a pair of bounded faces, and of others; at most six independent rows can be active
+Expression = Callable[..., Sequence[ca.SX]]
+# How expressions are evaluated: `call(name, expression, *arguments, kind=...)` returns the results. Expressions of the same
+# name and kind, for arguments of the same sparsity, differ only in their arguments.
+Call = Callable[..., Sequence[ca.SX]]
+
+
+def inline(name: str, expression: Expression, *arguments: ca.SX, kind: Hashable = ()) -> Sequence[ca.SX]:
+    """Return the results of an expression as a part of the expressions of its arguments."""
+    del name, kind
+    return expression(*arguments)
+
+
+class FunctionCalls:
+    """Calls of Functions, one for all expressions that are the same: results do not contain their instructions."""
+
+    def __init__(self) -> None:
+        self._functions: dict[Hashable, ca.Function] = {}
+
+    def __call__(self, name: str, expression: Expression, *arguments: ca.SX, kind: Hashable = ()) -> Sequence[ca.SX]:
+        """Return the results."""
+        key = name, kind, *(tuple(argument.sparsity().compress()) for argument in arguments)
+        if key not in self._functions:
+            symbols = [ca.SX.sym(f"i{k}", argument.sparsity()) for k, argument in enumerate(arguments)]
+            self._functions[key] = ca.Function(name, symbols, expression(*symbols))
+        never_inline = True
+        return self._functions[key].call([*arguments], False, never_inline)  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,3 +185,72 @@ def row_points(system: GroupEquations, standing: Sequence[np.ndarray | int], inp
             rows = pair_gaps(pair).points(points, system.deviations)
             points_of_pairs.append(RowPoints(rows, ca.SX(ca.DM(compliance[points]))))
     return points_of_pairs
+
+
+@dataclass(frozen=True, eq=False)
+class QuadraticTerms:
+    """The objective 1/2 z'Qz + gradient'z at a pose, divided by `scale`, see tolcontact.mechanics.objective.
+
+    Q, gradient          (z, z), (z, 1), in an exact resolution with the curvature of walls around round faces
+    curvature            (z, z): added to Q if a Newton step counts the curvature of objective and gaps, and Q stays convex
+    augmented_gradient   (z, 1): added to `gradient` together with `curvature`; from the augmented Lagrangian
+    proximal_hessian     (z, z): added to Q, times `proximal_weight`, if points are projected in each step
+    """
+
+    Q: ca.SX
+    gradient: ca.SX
+    curvature: ca.SX
+    augmented_gradient: ca.SX
+    proximal_hessian: ca.SX
+    scale: ca.SX
+
+    def summed(self, newton: ca.SX, proximal_weight: ca.SX, call: Call) -> tuple[ca.SX, ca.SX]:
+        """Return Q and the gradient, with curvature if `newton` is 1.
+
+        Curvature counts only while Q stays convex. The check covers the diagonal block of each mover, not the coupling of
+        movers.
+        """
+        counts = ca.logic_and(newton, is_convex(self.Q + self.curvature, call))
+        Q = self.Q + ca.if_else(counts, self.curvature, 0) + proximal_weight * self.proximal_hessian
+        return Q, self.gradient + ca.if_else(counts, self.augmented_gradient, 0)
+
+
+def quadratic_terms(
+    system: GroupEquations, rows: Rows, motion: Motion, reactions: ca.SX, load: ca.SX, *, projects: bool
+) -> QuadraticTerms:
+    """Return the terms at the poses of `motion`.
+
+    reactions   (row, 1) of the points in the previous step, and their sum `load` over all rows of the group
+    projects    whether points may be projected in each step
+    """
+    size = system.z.numel()
+    if system.group.has_springs:  # weak terms must not share the load with springs: they start from the present poses
+        system = replace(system, raw=motion.poses)
+    moved, nothing = motion.by(linear), ca.SX(size, size)
+    goal = energy(system, moved)
+    Q, gradient = (system.at_rest(expression) for expression in ca.hessian(goal.value, system.z))
+    if not system.method.is_exact:
+        return QuadraticTerms(Q, gradient, nothing, ca.SX(size, 1), nothing, goal.scale)
+    Q += rows.hollow_curvature / goal.scale
+    curvature = _lagrangian_hessian(system, motion.by(quadratic), rows.bends / goal.scale)
+    curvature += (rows.hollow_curvature - rows.curvature) / goal.scale - Q
+    # The augmented Lagrangian term of the active rows does not change the answer, and restores convexity in most cases.
+    penalty = (1 + 2 * load / goal.scale / system.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
+    curvature += congruent(ca.diag(penalty), rows.slopes)
+    opened = rows.gaps + (rows.compliance * reactions if rows.bent is None else rows.bent)  # [mm] at z = 0
+    proximal_hessian = system.curvature(proximity(system, motion.poses, moved)) / system.group.length if projects else nothing
+    return QuadraticTerms(Q, gradient, curvature, rows.slopes.T @ (penalty * opened), proximal_hessian, goal.scale)
+
+
+def _lagrangian_hessian(system: GroupEquations, poses: Sequence[Pose], bends: ca.SX) -> ca.SX:
+    """Return the Hessian, at z = 0, of the Lagrangian: the objective less the reactions' work on the gaps (linear in X_RM)."""
+    weights = ca.SX.sym("bends", bends.numel())  # independent of z: symbols, so that they are not differentiated
+    work = ca.dot(weights, ca.vertcat(*(X_RM.vector() for X_RM in system.relative(poses))))
+    return ca.substitute(system.curvature(energy(system, poses).value - work), weights, bends)
+
+
+def is_convex(Q: ca.SX, call: Call) -> ca.SX:
+    """Return 1 if the diagonal blocks of Q are positive definite, else 0; a NaN pivot gives 0, too."""
+    blocks = (Q[k : k + FREEDOMS, k : k + FREEDOMS] for k in range(0, Q.size1(), FREEDOMS))
+    pivots = ca.vertcat(*(call("pivots", lambda block: [ca.diag(ca.chol(ca.densify(block)))], block)[0] for block in blocks))
+    return ca.mmin(ca.if_else(pivots > 0, 1, 0))
