@@ -61,10 +61,6 @@ class Target:
         half = request.value / 100 if request.is_percent else request.value * (1e-6 if is_ppm else 1.0)
         return cls(request, request.measure, OUTSIDE if is_ppm else request.statistic, half, request.is_percent)
 
-    def check(self, program: Program) -> None:
-        """Raise OptionError if the model has no such measure."""
-        self.request.number_of([measure.name for measure in program.nominal.measures])
-
     def next(self, path: Path, program: Program) -> int | None:
         """Return the number of realizations that the archive should have next.
 
@@ -76,7 +72,10 @@ class Target:
         is_hopeless = math.isnan(half) and samples >= MAX_WITHOUT_INTERVAL
         if math.isnan(estimate) or half <= target_half or is_hopeless:
             return None
-        growth = self._growth(half, target_half)
+        growth = MAX_GROWTH
+        if target_half > 0 and math.isfinite(half):
+            ratio = half / target_half
+            growth = MARGIN * ratio * ratio  # infinite for a tiny target, where a power would raise an error
         if not samples * growth <= MAX_REALIZATIONS:
             return None
         rows = block_rows(program)
@@ -98,13 +97,6 @@ class Target:
         """Return the estimate, the half-width of its interval, and the largest permitted half-width."""
         estimate, lower, upper = estimate_of(results, self.measure, self.statistic)
         return estimate, (upper - lower) / 2, self.half * (abs(estimate) if self.is_relative else 1.0)
-
-    @staticmethod
-    def _growth(half: float, target_half: float) -> float:
-        if not (target_half > 0 and math.isfinite(half)):
-            return MAX_GROWTH
-        ratio = half / target_half
-        return MARGIN * ratio * ratio  # infinite for a tiny target, where a power would raise an error
 
 
 # The import registers the methods of results, for anyone who runs a model or opens an archive.
@@ -156,15 +148,10 @@ def run(
     `results = tc.run("model.py", samples=10_000, seed=1, solver="daqp", out="model.nc")`
     """
     settings = Run(seed, samples, keep, surfaces, fields, plan)
-    options = {"solver": solver, "method": method, "until": until, "client": client, "progress": progress}
-    if out is None:
-        return _results_in_memory(model, settings, options, overwrite=overwrite, resume=resume)
-    return open_unchecked(write_run(model, settings, Path(out), overwrite=overwrite, resume=resume, **options))
-
-
-def _results_in_memory(model: Model | Program, settings: Run, options: dict[str, Any], **archive_options: bool) -> xr.DataTree:
-    """Return the results of a run without keeping its archive. Raises OptionError for options that need an archive."""
-    for option, is_set in archive_options.items():
+    options: dict[str, Any] = {"solver": solver, "method": method, "until": until, "client": client, "progress": progress}
+    if out is not None:
+        return open_unchecked(write_run(model, settings, Path(out), overwrite=overwrite, resume=resume, **options))
+    for option, is_set in {"overwrite": overwrite, "resume": resume}.items():
         if is_set:
             raise OptionError(f"{option} needs an archive, and none is named; name one: out=...")
     with (
@@ -189,7 +176,11 @@ def write_run(
 ) -> Path:
     """Simulate into the archive `out` (see `run`), and return the path of the file; it differs from `out` if that is a link."""
     check_counts(samples=settings.samples, seed=settings.seed, surfaces=settings.surfaces)
-    _check_choices(settings)
+    check_choice("keep", settings.keep, KEPT)
+    fields = settings.fields
+    if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
+        raise OptionError(f"fields is {fields!r}; expected a whole number, at least 2, or one of: {', '.join(FIELD_CHOICES)}")
+    check_choice("plan", settings.plan, PLANS)
     check_program(model, solver, method)
     check_identities([] if resume else [model], {"archive": out})
     target = None if until is None else Target.of(until)
@@ -197,22 +188,13 @@ def write_run(
         program = program_of(model, solver, method)
         program = replace(program, draws=program.draws.planned(settings.plan))
         if target:
-            target.check(program)
+            target.request.number_of([measure.name for measure in program.nominal.measures])  # refuses unknown measures
         write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
     if target:
         with open_unchecked(path) as results:
             if sentence := target.shortfall(results):
                 log.warning(sentence)
     return path
-
-
-def _check_choices(settings: Run) -> None:
-    """Raise OptionError for an invalid choice of `run`."""
-    keep, fields, plan = settings.keep, settings.fields, settings.plan
-    check_choice("keep", keep, KEPT)
-    if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
-        raise OptionError(f"fields is {fields!r}; expected a whole number, at least 2, or one of: {', '.join(FIELD_CHOICES)}")
-    check_choice("plan", plan, PLANS)
 
 
 def write_archive(
@@ -232,7 +214,7 @@ def write_archive(
         if is_resumed:
             writer = ArchiveWriter.resume(path, program, settings)
         else:
-            writer = ArchiveWriter(path, program, settings, sums.sizes)
+            writer = ArchiveWriter(path, program, settings, sums.fields.sizes)
         remaining = writer.samples - writer.rows
         announce(program, samples=remaining, seed=settings.seed, keep=settings.keep, threads=threads_of(client))
         _simulate(program, writer, sums, settings.seed, blocks, progress)
@@ -262,7 +244,7 @@ def _simulate(
     except BaseException:
         if writer.has_new_rows:
             if writer.is_between_blocks:
-                writer.write_checkpoint(sums.numbers)
+                writer.write_checkpoint(sums.fields.numbers)
             with writer.completed(sums.groups):
                 pass
         raise
@@ -273,7 +255,7 @@ def _commit(writer: ArchiveWriter, sums: RunSums, rows: dict[str, np.ndarray], b
     writer.append(rows)
     sums.merge(block_sums)
     if writer.is_checkpoint_due:
-        writer.write_checkpoint(sums.numbers)
+        writer.write_checkpoint(sums.fields.numbers)
 
 
 def _check(program: Program, writer: ArchiveWriter, seed: int) -> None:
