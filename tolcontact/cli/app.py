@@ -31,14 +31,8 @@ MIN_COLUMNS = 40  # of a terminal: warnings are wrapped to no fewer
 COMMANDS = {
     **{command.name: ("analysis_command", command.purpose) for command in analyses.COMMANDS},
     "summary": ("archives", "Print the statistics of an archive."),
-    "report": (
-        "archives",
-        "Write a self-contained page for a browser from an archive, or a spreadsheet of its tables.",
-    ),
-    "compare": (
-        "run",
-        "Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other.",
-    ),
+    "report": ("archives", "Write a self-contained page for a browser from an archive, or a spreadsheet of its tables."),
+    "compare": ("run", "Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other."),
     "new": ("models", "Write a small model with comments as a starting point."),
     "guide": ("models", "Open the installed guide in the browser: tutorials, how-tos, theory, reference, glossary."),
     "check": ("models", "Check a model and its options without a run; list all faults and probable mistakes."),
@@ -136,8 +130,7 @@ def or_(names: Iterable[str]) -> str:
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly(), or a JSON model.")]
 AnalysedModel = Annotated[
-    Path,
-    typer.Argument(metavar="MODEL.py|RUN.nc", help="Model script, JSON model, or the archive of a run, for its model."),
+    Path, typer.Argument(metavar="MODEL.py|RUN.nc", help="Model script, JSON model, or the archive of a run, for its model.")
 ]
 StepFile = Annotated[Path, typer.Argument(metavar="FILE.stp", help="STEP file.")]
 Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
@@ -149,8 +142,7 @@ Resolution = Annotated[
     typer.Option(help=f"One linear step, or steps until all gaps are open: {or_(RESOLUTIONS)}. Default: the model's."),
 ]
 Objective = Annotated[
-    str | None,
-    typer.Option(help=f"Quantity that the pose with contact minimizes: {or_(OBJECTIVES)}. Default: the model's."),
+    str | None, typer.Option(help=f"Quantity that the pose with contact minimizes: {or_(OBJECTIVES)}. Default: the model's.")
 ]
 AsJson = Annotated[bool, flag("--json", "Print the result as JSON.")]
 AsCsv = Annotated[bool, flag("--csv", "Print the estimates as CSV.")]
@@ -158,8 +150,7 @@ Into = Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also store t
 Overwrite = Annotated[bool, flag("--overwrite", "Replace existing archives, pages and spreadsheets, whoever wrote them.")]
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Number of worker processes (with dask).")]
 Scheduler = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786."),
+    str | None, typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786.")
 ]
 Minutes = Annotated[
     float | None, typer.Option(help="Time after which the answer so far is printed, which says so; so does Ctrl-C.")

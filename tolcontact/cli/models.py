@@ -147,8 +147,7 @@ def _open_view(model: Assembly, nominal: Nominal | None, faults: Sequence[str], 
 def view(
     source: Annotated[Path, typer.Argument(metavar="MODEL|FILE.nc|FILE.stp", help="A model, an archive, or a STEP file.")],
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.html", help="Page to write. Default: a temporary page, opened in the browser."),
+        Path | None, typer.Option(metavar="FILE.html", help="Page to write. Default: a temporary page, opened in the browser.")
     ] = None,
     overwrite: common.Overwrite = False,
 ) -> None:

@@ -59,8 +59,7 @@ def run(
     resume: Annotated[bool, common.flag("--resume", "Continue the archive if it exists.")] = False,
     keep: Annotated[str, typer.Option(help=f"Variables to archive for each realization: {common.or_(KEPT)}.")] = "all",
     fields: Annotated[
-        str,
-        typer.Option(metavar="some|all|N|none", help="Number of realizations behind magnitudes of displacement fields."),
+        str, typer.Option(metavar="some|all|N|none", help="Number of realizations behind magnitudes of displacement fields.")
     ] = "some",
     plan: Annotated[str, typer.Option(help=f"Plan of the draws: {common.or_(PLANS)}.")] = MONTE_CARLO,
     until: Until = None,

@@ -196,16 +196,15 @@ class ContactSolver:
         return np.split(rows, range(self._max_dense, len(rows), self._max_dense)) if rows.size else []
 
     def _dense_problem(self, problem: Arrays) -> Problem:
-        return {name: self._dense(name, problem[name]) for name in ("h", "g", "a", "lba")}
-
-    def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
-        """Return all entries of an output of `assemble`: (realization, row, column), or (realization, row) of a vector."""
-        sparsity = self._qp.sparsity(name)
-        columns = np.zeros((len(stored), sparsity.numel()))
-        columns[:, sparsity.find()] = stored
-        if sparsity.size2() == 1:
-            return columns
-        return columns.reshape(len(stored), sparsity.size2(), sparsity.size1()).swapaxes(1, 2)
+        """Return all entries of h, g, a and lba: (realization, row, column), or (realization, row) of a vector."""
+        dense = {}
+        for name in ("h", "g", "a", "lba"):
+            stored, sparsity = problem[name], self._qp.sparsity(name)
+            columns = np.zeros((len(stored), sparsity.numel()))
+            columns[:, sparsity.find()] = stored
+            shape = len(stored), sparsity.size2(), sparsity.size1()
+            dense[name] = columns if sparsity.size2() == 1 else columns.reshape(shape).swapaxes(1, 2)
+        return dense
 
 
 def _is_rough(answer: Arrays) -> Bool[Array, " realization"]:

@@ -5,7 +5,7 @@ They also decide how deep bodies may penetrate each other in an answer, and how 
 
 import itertools
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -111,17 +111,16 @@ def _bounded_pair(
     tilt = float(pose.turn(X_RM, pose.AT_REST[None]).max())
     size = float(np.ptp(pair.moving_face.mesh.vertices, axis=0).max())
     bodies = nominal.parts[pair.moving].body, nominal.parts[pair.reference].body
+    depth = max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0)  # contact points suggest one for disjoint bodies, too
     reach = Reach(
         travel=TRAVEL_FACTOR * travel + pushed + MIN_TRAVEL_SHARE * size,
         tilt=tilt + pushed / size,
         spread=travel,
-        overlap=pair.coordinate_error + _overlap(watch, pair),
+        overlap=pair.coordinate_error + (depth if depth > 0 and watch.overlap(pair.moving, pair.reference) else 0.0),
         clearance=pair.clearance,
     )
     pair_meeting = meeting((pair.moving_face, pair.reference_face), bodies, reach, has_form=pair.has_form)
-    if pair_meeting is not None:
-        _check_corners(nominal, pair, pair_meeting)
-    else:
+    if pair_meeting is None:
         warnings.warn(
             f'contact pair "{shown(pair.name)}": its faces have too many edges to find contact where they end; '
             "use coarser meshes, or choose smaller faces",
@@ -129,18 +128,12 @@ def _bounded_pair(
             stacklevel=2,
         )
         return nothing
+    _check_corners(nominal, pair, pair_meeting)
     error = _error_of_planes(pair, pair_meeting, X_RM, deviations, room)
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
     represents_curves = FACET_FACTOR * bulge <= COARSE_SHARE * smallest
     allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if represents_curves else 0.0)
-    trial = Trial(error, allowed)
-    return (pair_meeting if trial.error > trial.allowed else None), trial
-
-
-def _overlap(watch: Watch, pair: ContactPoints) -> float:
-    """Return the nominal penetration [mm] of the bodies of a pair; 0 for disjoint bodies, whatever contact points suggest."""
-    depth = max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0)
-    return depth if depth > 0 and pair.reference is not None and watch.overlap(pair.moving, pair.reference) else 0.0
+    return (pair_meeting if error > allowed else None), Trial(error, allowed)
 
 
 def _check_corners(nominal: Nominal, pair: ContactPoints, pair_meeting: Meeting) -> None:
@@ -189,16 +182,12 @@ def allowed_depths(
             planes = PLANES_FACTOR * trials[k].allowed if is_fixed else 0.0
             rounding = 0.0 if k in meetings else pair.coordinate_error
             depths[bodies] = max(depths.get(bodies, 0.0), np.inf if pair.may_interfere else planes + rounding)
-    return depths | dict.fromkeys(_declared_overlaps(nominal), np.inf)
-
-
-def _declared_overlaps(nominal: Nominal) -> Iterator[tuple[int, int]]:
-    """Yield the pairs of bodies, of one station, that are declared to overlap."""
     for overlap in nominal.assembly.overlaps:
         indices = [index for index, part in enumerate(nominal.parts) if part.part in overlap.parts]
         for left, right in itertools.combinations(indices, 2):
             if nominal.parts[left].station == nominal.parts[right].station:
-                yield left, right
+                depths[left, right] = np.inf
+    return depths
 
 
 def measure_accuracies(

@@ -154,10 +154,7 @@ def run(
     for option, is_set in {"overwrite": overwrite, "resume": resume}.items():
         if is_set:
             raise OptionError(f"{option} needs an archive, and none is named; name one: out=...")
-    with (
-        temporary_folder() as folder,
-        open_unchecked(write_run(model, settings, folder / "results.nc", **options)) as tree,
-    ):
+    with temporary_folder() as folder, open_unchecked(write_run(model, settings, folder / "results.nc", **options)) as tree:
         return tree.load()
 
 
