@@ -142,25 +142,6 @@ def titled_model(path: Path, entries: Mapping[str, str | None]) -> Assembly:
     return assembly
 
 
-class Pace:
-    """The recent rate of finished realizations, and the remaining time.
-
-    Realizations that took no time (of a resumed run) and early delays (compilation) do not count.
-    """
-
-    def __init__(self) -> None:
-        self._reports: deque[tuple[float, int]] = deque()  # [s], realizations
-
-    def rate(self, done: int) -> float:
-        """Return the finished realizations per second; 0 before there are enough reports."""
-        now = time.monotonic()
-        self._reports.append((now, done))
-        while now - self._reports[0][0] > WINDOW and len(self._reports) > MIN_REPORTS:
-            self._reports.popleft()
-        seconds, rows = now - self._reports[0][0], done - self._reports[0][1]
-        return rows / seconds if len(self._reports) >= MIN_REPORTS and rows > 0 and seconds > 0 else 0.0
-
-
 @contextlib.contextmanager
 def shown_progress(
     name: str, total: int, *, quiet: bool, interval: float = LINE_INTERVAL, long_wait: float = LONG_WAIT
@@ -178,12 +159,24 @@ def shown_progress(
         TextColumn("{task.fields[pace]}"),
     )
     bar = Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal)
-    pace, last, is_advised = Pace(), time.monotonic(), quiet
+    reports, last, is_advised = deque[tuple[float, int]](), time.monotonic(), quiet  # [s], realizations
     task = bar.add_task(shown(name), total=total, pace="")
+
+    def rate_of(done: int) -> float:
+        """Return the recent rate of finished realizations per second; 0 before there are enough reports.
+
+        Realizations that took no time (of a resumed run) and early delays (compilation) do not count.
+        """
+        now = time.monotonic()
+        reports.append((now, done))
+        while now - reports[0][0] > WINDOW and len(reports) > MIN_REPORTS:
+            reports.popleft()
+        seconds, rows = now - reports[0][0], done - reports[0][1]
+        return rows / seconds if len(reports) >= MIN_REPORTS and rows > 0 and seconds > 0 else 0.0
 
     def show(done: int, total: int) -> None:
         nonlocal last, is_advised
-        rate = pace.rate(done)
+        rate = rate_of(done)
         remaining = (total - done) / rate if rate else 0.0
         speed = f"{grouped(round(rate))} a second, {duration(remaining)} left" if rate else ""
         if rate and not is_advised:

@@ -1,7 +1,6 @@
 """The contact QP of one group for many realizations: assemble, predict the active set, solve, polish, evaluate."""
 
 import copy
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -145,7 +144,7 @@ class ContactSolver:
         predicted = np.zeros(len(slacks), dtype=np.bool_)
         for rows in self._parts(np.flatnonzero(inputs["guess"].any(axis=1))):
             systems = self._dense_problem(_of(problem, rows))
-            solution = ActiveSet(active[rows], slacks[rows] > 0).answer(systems, self._order)
+            solution = solve_active(systems, active[rows], slacks[rows] > 0, self._order)
             answer = self._finished(_of(inputs, rows) | _of(problem, rows) | solution)
             outputs = outputs or {name: np.empty((len(slacks), values.shape[1])) for name, values in answer.items()}
             _replace(outputs, rows, answer)
@@ -172,7 +171,7 @@ class ContactSolver:
             pushes = -solution["lam_a"][:, : problem["length"].shape[1]]
             return self._kernel(problem, pushes, np.zeros_like(pushes))[0]
         systems = self._dense_problem(problem)
-        return ActiveSet.of_answer(systems, solution, self._equalities, self._qp.slacks).answer(systems, self._order)
+        return solve_active(systems, *active_set(systems, solution, self._equalities, self._qp.slacks), self._order)
 
     def _finished(self, arrays: Arrays) -> Arrays:
         """Return the outputs of `finish`; elastic parts bend by the reactions, and rows in conflict are `opened`."""
@@ -230,45 +229,39 @@ def _replace(arrays: Arrays, rows: np.ndarray, replacements: Arrays) -> None:
         arrays[name][rows] = values
 
 
-class ActiveSet(NamedTuple):
-    """The active sets of QPs: min x'Hx/2 + g'x, a x >= lba; some rows are equations, the last variables, slacks, >= 0.
+def active_set(
+    problem: Problem, answer: Arrays, equalities: Int[Array, " k"], slacks: int
+) -> tuple[Bool[Array, "QP row"], Bool[Array, "QP slack"]]:
+    """Return which rows are active and which slacks are positive in a solver's answers: min x'Hx/2 + g'x, a x >= lba.
 
-    active    (QP, row): whether a row is active
-    is_open   (QP, slack): whether a slack is positive
+    The rows `equalities` are equations, and the last variables are slacks, >= 0.
+
+    problem     h (QP, n, n), g (QP, n), a (QP, row, n), lba (QP, row)
+    answer      x (QP, n), lam_a (QP, row), lam_x (QP, n) of a solver; multipliers of active rows are negative
     """
+    x, lam_a, lam_x = (answer[name] for name in ("x", "lam_a", "lam_x"))
+    # For every solver, either the row or its multiplier is zero up to rounding: the smaller of the two.
+    active = -lam_a > np.einsum("kij,kj->ki", problem["a"], x) - problem["lba"]
+    active[:, equalities] = True
+    return active, (-lam_x <= x)[:, x.shape[1] - slacks :]
 
-    active: Bool[Array, "QP row"]
-    is_open: Bool[Array, "QP slack"]
 
-    @classmethod
-    def of_answer(cls, problem: Problem, answer: Arrays, equalities: Int[Array, " k"], slacks: int) -> "ActiveSet":
-        """Return the active sets of a solver's answers; the rows `equalities` are equations.
+def solve_active(
+    problem: Problem, active: Bool[Array, "QP row"], is_open: Bool[Array, "QP slack"], order: Int[Array, " unknown"]
+) -> Arrays:
+    """Return x, lam_a and lam_x (QP, entry) of QPs with an active set, each one linear system; NaN without a solution.
 
-        problem     h (QP, n, n), g (QP, n), a (QP, row, n), lba (QP, row)
-        answer      x (QP, n), lam_a (QP, row), lam_x (QP, n) of a solver; multipliers of active rows are negative
-        """
-        A, lower = problem["a"], problem["lba"]
-        x, lam_a, lam_x = (answer[name] for name in ("x", "lam_a", "lam_x"))
-        # For every solver, either the row or its multiplier is zero up to rounding: the smaller of the two.
-        active = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
-        active[:, equalities] = True
-        is_open = (-lam_x <= x)[:, x.shape[1] - slacks :]
-        return cls(active, is_open)
-
-    def answer(self, problem: Problem, order: Int[Array, " unknown"]) -> Arrays:
-        """Return x, lam_a and lam_x (QP, entry) of the QPs; NaN if the conditions have no solution.
-
-        order   order of the unknowns, see solve_conditions
-        """
-        H, g, A, lower = (problem[name] for name in ("h", "g", "a", "lba"))
-        count, rows, size = A.shape
-        slacks = self.is_open.shape[1]
-        solution = np.empty((count, size + rows + slacks))
-        solve_conditions((H, g, A, lower), self.active, self.is_open, order, COMPLIANCE, REFINEMENTS, solution)
-        x, multipliers = solution[:, :size], solution[:, size:]
-        lam_x = np.zeros_like(x)
-        lam_x[:, size - slacks :] = -multipliers[:, rows:]
-        return {"x": x, "lam_a": -multipliers[:, :rows], "lam_x": lam_x}
+    order   order of the unknowns, see solve_conditions
+    """
+    H, g, A, lower = (problem[name] for name in ("h", "g", "a", "lba"))
+    count, rows, size = A.shape
+    slacks = is_open.shape[1]
+    solution = np.empty((count, size + rows + slacks))
+    solve_conditions((H, g, A, lower), active, is_open, order, COMPLIANCE, REFINEMENTS, solution)
+    x, multipliers = solution[:, :size], solution[:, size:]
+    lam_x = np.zeros_like(x)
+    lam_x[:, size - slacks :] = -multipliers[:, rows:]
+    return {"x": x, "lam_a": -multipliers[:, :rows], "lam_x": lam_x}
 
 
 def band_order(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int) -> Int[Array, " unknown"]:
