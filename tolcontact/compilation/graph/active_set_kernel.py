@@ -27,8 +27,8 @@ CHECKED, ENTERED, PARTIAL, STUCK = range(4)
 def multiply(layout, work):  # type: ignore[no-untyped-def]
     """Compute the multipliers of the active rows, as equations, and the solution; return the largest multiplier."""
     multipliers = work.multiplier
-    for j in range(work.count.size):
-        for t in range(layout.first[j], layout.first[j] + work.count[j]):
+    for j in range(work.counts.size):
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             row = work.active[t]
             multipliers[t] = work.bound[row] + product(layout.blocks, work.slopes, row, work.gradient)
             if work.open[j]:
@@ -44,9 +44,9 @@ def move(layout, work):  # type: ignore[no-untyped-def]
         for c in range(6):
             work.y[body, c] = -work.gradient[body, c]
     largest = 0.0
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         slack = -work.price[j]
-        for t in range(layout.first[j], layout.first[j] + work.count[j]):
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             row, multiplier = work.active[t], work.multiplier[t]
             add_row(layout.blocks, work.slopes, row, multiplier, work.y)
             slack += work.opening[row] * multiplier
@@ -61,8 +61,8 @@ def refine(layout, work):  # type: ignore[no-untyped-def]
     missed = np.inf
     for _ in range(REFINEMENTS):
         remainder = 0.0
-        for j in range(work.count.size):
-            for t in range(layout.first[j], layout.first[j] + work.count[j]):
+        for j in range(work.counts.size):
+            for t in range(layout.first[j], layout.first[j] + work.counts[j]):
                 work.step[t] = -excess(layout, work, work.active[t])
                 remainder = max(remainder, abs(work.step[t]))
         helps = remainder > FEASIBLE and remainder < missed / 2
@@ -70,8 +70,8 @@ def refine(layout, work):  # type: ignore[no-untyped-def]
         if not helps:
             break
         solve(layout, work, work.step)
-        for j in range(work.count.size):
-            for t in range(layout.first[j], layout.first[j] + work.count[j]):
+        for j in range(work.counts.size):
+            for t in range(layout.first[j], layout.first[j] + work.counts[j]):
                 work.multiplier[t] += work.step[t]
         move(layout, work)
     return missed
@@ -102,11 +102,11 @@ def release(layout, work, tolerance):  # type: ignore[no-untyped-def]
     Return the number of changes.
     """
     changes = 0
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         if layout.slack[j] < 0:
             continue
         lowest, position = -tolerance, layout.first[j]
-        for t in range(layout.first[j], layout.first[j] + work.count[j]):
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             if work.multiplier[t] < lowest:
                 lowest, position = work.multiplier[t], t
         if lowest < -tolerance:
@@ -122,7 +122,7 @@ def release(layout, work, tolerance):  # type: ignore[no-untyped-def]
 def close_slacks(layout, work, tolerance):  # type: ignore[no-untyped-def]
     """Close negative slacks, and return their number."""
     changes = 0
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         if work.open[j] and work.value[j] < -CLOSED * tolerance:
             toggle(layout, work, j)
             changes += 1
@@ -133,7 +133,7 @@ def close_slacks(layout, work, tolerance):  # type: ignore[no-untyped-def]
 def scan(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
     """Write the most violated row of each joint, or -1, and its excess; return whether any row is violated."""
     violated = False
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         depths[j], deepest[j] = -tolerance, -1
         if layout.slack[j] < 0:
             continue
@@ -174,15 +174,15 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
     for body in range(direction.shape[0]):
         for c in range(6):
             direction[body, c] = scatter[body, c]
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         work.change[j] = opening if j == joint else 0.0
-        for t in range(layout.first[j], layout.first[j] + work.count[j]):
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             change[t] = product(layout.blocks, work.slopes, work.active[t], scatter)
             if work.open[j] and j == joint:
                 change[t] += opening * work.opening[work.active[t]]
     solve(layout, work, change)
-    for j in range(work.count.size):
-        for t in range(layout.first[j], layout.first[j] + work.count[j]):
+    for j in range(work.counts.size):
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             add_row(layout.blocks, work.slopes, work.active[t], -change[t], direction)
             work.change[j] -= work.opening[work.active[t]] * change[t]
     rate = opening * work.change[joint] if work.open[joint] else 0.0
@@ -192,7 +192,7 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
     else:
         # If the slack closes, its rows have the relative pivot of the slack times the square of their openings.
         largest = 0.0
-        for t in range(layout.first[joint], layout.first[joint] + work.count[joint]):
+        for t in range(layout.first[joint], layout.first[joint] + work.counts[joint]):
             largest = max(largest, work.opening[work.active[t]] ** 2)
         square = 1.0 / largest if largest > 0.0 else 0.0
     return rate if rate > dependence(work) * square else 0.0
@@ -202,10 +202,10 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
 def _block(layout, work):  # type: ignore[no-untyped-def]
     """Return the longest step that keeps multipliers nonnegative, and the row or slack that blocks it (see most_violated)."""
     step, blocking = np.inf, -1
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         if layout.slack[j] < 0:
             continue
-        for t in range(layout.first[j], layout.first[j] + work.count[j]):
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             change = work.step[t]
             if change > RELIEVED and work.multiplier[t] < step * change:
                 step, blocking = max(work.multiplier[t], 0.0) / change, work.active[t]
@@ -221,9 +221,9 @@ def _advance(layout, work, length):  # type: ignore[no-untyped-def]
     for body in range(work.y.shape[0]):
         for c in range(6):
             work.y[body, c] += length * work.direction[body, c]
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         work.value[j] += length * work.change[j]
-        for t in range(layout.first[j], layout.first[j] + work.count[j]):
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             work.multiplier[t] -= length * work.step[t]
 
 

@@ -23,7 +23,7 @@ class Work(NamedTuple):
     opening, bound  (row,)
     position    (row,) position of each active row, -1 for inactive rows
     gradient, y, scatter, direction  (body, 6): the gradient, the solution y, one row among zeros, the direction of y
-    count       (joint,) number of active rows of the joint, which take its first positions
+    counts      (joint,) number of active rows of the joint, which take its first positions
     fresh       (joint,) number of these rows with valid entries of the factor
     changed     (joint,) whether other entries have changed
     open        (joint,) whether the slack is open
@@ -42,7 +42,7 @@ class Work(NamedTuple):
     y: np.ndarray
     scatter: np.ndarray
     direction: np.ndarray
-    count: np.ndarray
+    counts: np.ndarray
     fresh: np.ndarray
     changed: np.ndarray
     open: np.ndarray
@@ -100,17 +100,17 @@ def set_row(blocks, slopes, row, weight, vectors):  # type: ignore[no-untyped-de
 @inlined_inner
 def has_position(layout, work, j):  # type: ignore[no-untyped-def]
     """Return whether one more row of joint j can be active. More rows than positions are dependent, up to rounding."""
-    return layout.first[j] + work.count[j] < layout.first[j + 1]
+    return layout.first[j] + work.counts[j] < layout.first[j + 1]
 
 
 @inlined_inner
 def append(layout, work, row):  # type: ignore[no-untyped-def]
     """Activate a row, after the other active rows of its joint, which must have a position left."""
     j = layout.joint[row]
-    position = layout.first[j] + work.count[j]
+    position = layout.first[j] + work.counts[j]
     work.active[position], work.position[row] = row, position
     work.multiplier[position] = 0.0
-    work.count[j] += 1
+    work.counts[j] += 1
 
 
 @inlined_inner
@@ -118,8 +118,8 @@ def remove(layout, work, position):  # type: ignore[no-untyped-def]
     """Deactivate the row at a position."""
     j = layout.joint[work.active[position]]
     work.position[work.active[position]] = -1
-    work.count[j] -= 1
-    for s in range(position, layout.first[j] + work.count[j]):
+    work.counts[j] -= 1
+    for s in range(position, layout.first[j] + work.counts[j]):
         work.active[s], work.multiplier[s] = work.active[s + 1], work.multiplier[s + 1]
         work.position[work.active[s]] = s
     work.fresh[j] = min(work.fresh[j], position - layout.first[j])
@@ -132,7 +132,7 @@ def _eliminated(layout, work, j, position, value, solution):  # type: ignore[no-
     factor = work.factor
     for q in range(layout.prior_start[j], layout.prior_start[j + 1]):
         start = layout.first[layout.prior[q, 0]]
-        for t in range(start, start + work.count[layout.prior[q, 0]]):
+        for t in range(start, start + work.counts[layout.prior[q, 0]]):
             value -= factor[position, t] * solution[t]
     for t in range(layout.first[j], position):
         value -= factor[position, t] * solution[t]
@@ -150,7 +150,7 @@ def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untype
     pivot = square
     for q in range(layout.prior_start[j], layout.prior_start[j + 1]):
         k, adjacent = layout.prior[q, 0], layout.prior[q, 1]
-        for t in range(layout.first[k], layout.first[k] + work.count[k]):
+        for t in range(layout.first[k], layout.first[k] + work.counts[k]):
             value = product(layout.blocks, work.slopes, active[t], scatter) if adjacent else 0.0
             column[t] = _eliminated(layout, work, k, t, value, column) / factor[t, t]
             pivot -= column[t] * column[t]
@@ -162,7 +162,7 @@ def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untype
         pivot -= column[t] * column[t]
     for q in range(layout.prior_start[j], layout.prior_start[j + 1]):
         k = layout.prior[q, 0]
-        for t in range(layout.first[k], layout.first[k] + work.count[k]):
+        for t in range(layout.first[k], layout.first[k] + work.counts[k]):
             factor[position, t], column[t] = column[t], 0.0
     for t in range(start, position):
         factor[position, t], column[t] = column[t], 0.0
@@ -175,7 +175,7 @@ def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untype
 def any_open(work):  # type: ignore[no-untyped-def]
     """Return whether a slack is open."""
     is_open = False
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         is_open = is_open or work.open[j] > 0
     return is_open
 
@@ -190,20 +190,20 @@ def dependence(work):  # type: ignore[no-untyped-def]
 def factorize(layout, work):  # type: ignore[no-untyped-def]
     """Complete the factor, and return the number of rows that are dropped, since they depend on rows before them."""
     dropped, threshold = 0, dependence(work)
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         for q in range(layout.prior_start[j], layout.prior_start[j + 1]):
             if work.changed[layout.prior[q, 0]]:
                 work.fresh[j], work.changed[j] = 0, 1
-        if work.fresh[j] < work.count[j]:
+        if work.fresh[j] < work.counts[j]:
             work.changed[j] = 1
-        while work.fresh[j] < work.count[j]:
+        while work.fresh[j] < work.counts[j]:
             position = layout.first[j] + work.fresh[j]
             if _factor_row(layout, work, j, position, threshold):
                 work.fresh[j] += 1
             else:
                 remove(layout, work, position)
                 dropped += 1
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         work.changed[j] = 0
     return dropped
 
@@ -212,16 +212,16 @@ def factorize(layout, work):  # type: ignore[no-untyped-def]
 def solve(layout, work, values):  # type: ignore[no-untyped-def]
     """Solve with the Gram matrix of the active rows, in place; values (position,)."""
     factor = work.factor
-    for j in range(work.count.size):
-        for position in range(layout.first[j], layout.first[j] + work.count[j]):
+    for j in range(work.counts.size):
+        for position in range(layout.first[j], layout.first[j] + work.counts[j]):
             values[position] = _eliminated(layout, work, j, position, values[position], values) / factor[position, position]
-    for j in range(work.count.size - 1, -1, -1):
-        for position in range(layout.first[j] + work.count[j] - 1, layout.first[j] - 1, -1):
+    for j in range(work.counts.size - 1, -1, -1):
+        for position in range(layout.first[j] + work.counts[j] - 1, layout.first[j] - 1, -1):
             value = values[position] / factor[position, position]
             values[position] = value
             for q in range(layout.prior_start[j], layout.prior_start[j + 1]):
                 start = layout.first[layout.prior[q, 0]]
-                for t in range(start, start + work.count[layout.prior[q, 0]]):
+                for t in range(start, start + work.counts[layout.prior[q, 0]]):
                     values[t] -= factor[position, t] * value
             for t in range(layout.first[j], position):
                 values[t] -= factor[position, t] * value

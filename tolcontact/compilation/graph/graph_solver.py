@@ -134,7 +134,7 @@ def _buffers(layout: Layout, coupled: bool) -> tuple[Work, np.ndarray, np.ndarra
         bound=np.zeros(rows),
         position=np.zeros(rows, dtype=np.int64),
         **{name: np.zeros((bodies, FREEDOMS)) for name in ("gradient", "y", "scatter", "direction")},
-        **{name: np.zeros(joints, dtype=np.int64) for name in ("count", "fresh", "changed", "open")},
+        **{name: np.zeros(joints, dtype=np.int64) for name in ("counts", "fresh", "changed", "open")},
         **{name: np.zeros(joints) for name in ("price", "value", "change")},
         factor=np.zeros((positions, positions)),
         active=np.zeros(positions, dtype=np.int64),

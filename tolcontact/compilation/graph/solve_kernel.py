@@ -128,16 +128,16 @@ def _load(layout, work, problem, k, clears):  # type: ignore[no-untyped-def]
     for body in range(bodies):
         for c in range(6):
             work.gradient[body, c] = gradient[k, 6 * layout.bodies[body] + c]
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         work.price[j] = gradient[k, 6 * bodies + layout.slack[j]] if layout.slack[j] >= 0 else 0.0
-        work.count[j], work.fresh[j] = 0, 0
+        work.counts[j], work.fresh[j] = 0, 0
         work.changed[j] = 0
 
 
 @inlined_inner
 def _start(layout, work, reactions, slacks, k):  # type: ignore[no-untyped-def]
     """Open the guessed slacks, and activate equations and guessed rows, up to the number of positions."""
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         slack = layout.slack[j]
         work.open[j] = slack >= 0 and slacks[k, slack] > 0
     for row in range(layout.joint.size):
@@ -149,7 +149,7 @@ def _start(layout, work, reactions, slacks, k):  # type: ignore[no-untyped-def]
 @inlined_inner
 def _holds_equations(layout, work):  # type: ignore[no-untyped-def]
     """Return whether the inactive equations hold, which depend on others."""
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         if layout.slack[j] < 0:
             for row in range(layout.row[j], layout.row[j + 1]):
                 if work.position[row] < 0 and abs(excess(layout, work, row)) > MISSED:
@@ -164,13 +164,13 @@ def _store(layout, work, k, x, lam_a, lam_x):  # type: ignore[no-untyped-def]
     for body in range(bodies):
         for c in range(6):
             x[k, 6 * layout.bodies[body] + c] = work.y[body, c]
-    for j in range(work.count.size):
+    for j in range(work.counts.size):
         if layout.slack[j] >= 0:
             if work.open[j]:
                 x[k, 6 * bodies + layout.slack[j]] = work.value[j]
             else:
                 lam_x[k, 6 * bodies + layout.slack[j]] = work.value[j]
-        for t in range(layout.first[j], layout.first[j] + work.count[j]):
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             lam_a[k, layout.source[work.active[t]]] = -work.multiplier[t]
 
 
