@@ -3,7 +3,7 @@
 The block Cholesky factor C transforms a QP so that H is the identity: its rows become C^-1 a.
 
 Rows of length 1 have the Gram matrix N N'. For rows of a pair whose slack is open, the products of their openings are added.
-The Cholesky factor has entries only between joints that the elimination order connects (see layout).
+The Cholesky factor has entries only between joints that the elimination order connects (see graph_solver).
 """
 
 from typing import NamedTuple

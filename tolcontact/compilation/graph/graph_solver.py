@@ -1,6 +1,11 @@
-"""A solver of contact QPs that exploits the graph of bodies: few bodies touch each other, so the matrices are sparse."""
+"""A solver of contact QPs that exploits the graph of bodies: few bodies touch each other, so the matrices are sparse.
 
-from collections.abc import Mapping
+Its layout of a QP states the bodies that each row touches, and the elimination order of joints. A joint is the set of rows that
+share a slack (the rows of a contact pair), or a set of equations that touch the same bodies.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -9,13 +14,51 @@ from tolcontact.arrays import Array, Bool, Float
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.elastic_solver import ElasticSolver
 from tolcontact.compilation.graph.factor_kernel import Work
-from tolcontact.compilation.graph.layout import Layout, layout
 from tolcontact.compilation.graph.solve_kernel import solve_batch
 from tolcontact.compilation.solver import Arrays, SolverChoice
 from tolcontact.mechanics.correction import FREEDOMS
 
 FEW_BODIES, ROUNDS_OF_FEW, ROUNDS = 2, 4, 40  # rounds of all joints at once
 STEPS_PER_ROW = 4  # steps of single rows
+
+Key = Callable[[int, Sequence[int], Sequence[set[int]]], tuple[int, ...]]
+
+
+class Layout(NamedTuple):
+    """Constant arrays for the solution of QPs. Bodies, joints and rows are numbered in elimination order.
+
+    blocks      (row, 1 + block) number of bodies that the row touches, and these bodies, in ascending order
+    joint       (row,) the joint of the row; the rows of a joint are consecutive
+    source      (row,) its index in the QP
+    row         (joint + 1,) the first row of the joint
+    first       (joint + 1,) its first position in the Gram matrix of the active rows
+    slack       (joint,) its slack, or -1 for equations
+    prior_start (joint + 1,) its first row of `prior`
+    prior       (_, 2) earlier joints that share entries of the Gram factor with the joint, and whether the two share a body, so
+                that the Gram matrix has entries, too
+    bodies      (body,) index of each body in the QP
+    entries     (nonzero of a) offset of each nonzero in a buffer: slopes (row, block, 6), then openings (row,)
+    hessian_entries (nonzero of h) offset of each nonzero in the lower triangular blocks (block, 6, 6) of H, or -1
+    starts      (body + 1,) first block of each body's row; its last block is on the diagonal
+    columns     (block,) body of each block's column
+    block_of    (body, body) block of a row and column, or -1
+    """
+
+    blocks: np.ndarray
+    joint: np.ndarray
+    source: np.ndarray
+    row: np.ndarray
+    first: np.ndarray
+    slack: np.ndarray
+    prior_start: np.ndarray
+    prior: np.ndarray
+    bodies: np.ndarray
+    entries: np.ndarray
+    hessian_entries: np.ndarray
+    starts: np.ndarray
+    columns: np.ndarray
+    block_of: np.ndarray
+
 
 Layouts = dict[bool, Layout]  # by whether H couples bodies
 
@@ -141,3 +184,149 @@ def _buffers(layout: Layout, coupled: bool) -> tuple[Work, np.ndarray, np.ndarra
         **{name: np.zeros(positions) for name in ("multiplier", "step", "column")},
     )
     return work, buffer, np.zeros((len(layout.columns) if coupled else 0, FREEDOMS, FREEDOMS))
+
+
+def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupled: bool) -> Layout:
+    """Return the layout of QPs with these sparsities.
+
+    If `coupled`, H = C C' has off-diagonal blocks. Rows become C^-1 a, which also touches the bodies that follow in the factor.
+    """
+    bodies, count = (h.size1() - slacks) // FREEDOMS, a.size1()
+    rows, columns = (np.array(indices, dtype=np.int64) for indices in a.get_triplet())
+    of_body = columns < bodies * FREEDOMS
+    touched: list[set[int]] = [set() for _ in range(count)]
+    for row, column in zip(rows[of_body].tolist(), columns[of_body].tolist(), strict=True):
+        touched[row].add(column // FREEDOMS)
+    slack_of_row = np.full(count, -1)
+    slack_of_row[rows[~of_body]] = columns[~of_body] - bodies * FREEDOMS
+    graph = _body_graph(h, bodies) if coupled else [set() for _ in range(bodies)]
+    body_order, later = elimination(graph, least_depth)
+    if coupled:
+        touched = [_with_later(body_order, later, nodes) for nodes in touched]
+    joints, equation_joints = _joints(touched, slack_of_row.tolist(), count - equations)
+    joint_bodies = [set().union(*(touched[row] for row in members)) for members in joints]
+    adjacent = [{k for k, nodes in enumerate(joint_bodies) if k != j and nodes & joint_bodies[j]} for j in range(len(joints))]
+    # Equations come first, so that no equation is dropped because it depends on rows that may leave.
+    order, joined = elimination(adjacent, lambda j, depths, graph: (j >= equation_joints, *least_degree(j, depths, graph)))
+    prior = [sorted(k for k, nodes in enumerate(joined) if j in nodes) for j in range(len(order))]
+    members = [joints[j] for j in order]
+    row_order = np.array([row for rows_of_joint in members for row in rows_of_joint], dtype=np.int64)
+    body_rank = np.argsort(body_order)
+    blocks = [sorted(int(body_rank[body]) for body in touched[row]) for row in row_order]
+    width = max([1, *map(len, blocks)])
+    sizes = [len(joints[j]) if j < equation_joints else min(len(joints[j]), FREEDOMS * len(joint_bodies[j]) + 2) for j in order]
+    prior_joints = [(k, order[k] in adjacent[order[j]]) for j, nodes in enumerate(prior) for k in nodes]
+    return Layout(
+        blocks=np.array([[len(nodes), *nodes] + [0] * (width - len(nodes)) for nodes in blocks], dtype=np.int64),
+        joint=np.repeat(np.arange(len(order)), list(map(len, members))),
+        source=row_order,
+        row=_starts(members),
+        first=np.cumsum([0, *sizes]),
+        slack=np.array([slack_of_row[rows_of_joint[0]] for rows_of_joint in members], dtype=np.int64),
+        prior_start=_starts(prior),
+        prior=np.array(prior_joints, dtype=np.int64).reshape(-1, 2),
+        bodies=np.array(body_order, dtype=np.int64),
+        entries=_entries(rows, columns, np.argsort(row_order), body_rank, blocks, width),
+        **_hessian_blocks(h, body_rank, later),
+    )
+
+
+def _starts(lists: Sequence[Sequence[int] | set[int]]) -> np.ndarray:
+    return np.cumsum([0, *map(len, lists)])
+
+
+def _body_graph(h: ca.Sparsity, bodies: int) -> list[set[int]]:
+    """Return the bodies that H couples to each body."""
+    graph: list[set[int]] = [set() for _ in range(bodies)]
+    for row, column in zip(*h.get_triplet(), strict=True):
+        i, j = row // FREEDOMS, column // FREEDOMS
+        if i != j and max(i, j) < bodies:
+            graph[i].add(j)
+            graph[j].add(i)
+    return graph
+
+
+def _with_later(order: Sequence[int], later: Sequence[Sequence[int]], bodies: set[int]) -> set[int]:
+    """Return the bodies, and the bodies that follow them in the factor of H."""
+    ranks = {order.index(body) for body in bodies}
+    for rank in range(len(order)):
+        if rank in ranks:
+            ranks.update(later[rank])
+    return {order[rank] for rank in ranks}
+
+
+def _joints(touched: Sequence[set[int]], slacks: Sequence[int], inequalities: int) -> tuple[list[list[int]], int]:
+    """Return the rows of each joint, joints of equations first, and the number of these."""
+    pairs: dict[int, list[int]] = {}
+    equations: dict[tuple[int, ...], list[int]] = {}
+    for row, (bodies, slack) in enumerate(zip(touched, slacks, strict=True)):
+        if row >= inequalities:
+            equations.setdefault(tuple(sorted(bodies)), []).append(row)
+        else:
+            pairs.setdefault(slack, []).append(row)
+    return [*equations.values(), *pairs.values()], len(equations)
+
+
+def _entries(
+    rows: np.ndarray, columns: np.ndarray, row_rank: np.ndarray, body_rank: np.ndarray, blocks: Sequence[list[int]], width: int
+) -> np.ndarray:
+    """Return the offset of each nonzero of a in the buffer of the rows."""
+    openings = len(blocks) * width * FREEDOMS
+    offsets = np.zeros(len(rows), dtype=np.int64)
+    for k, (row, column) in enumerate(zip(row_rank[rows].tolist(), columns.tolist(), strict=True)):
+        body, freedom = divmod(column, FREEDOMS)
+        if body >= len(body_rank):
+            offsets[k] = openings + row
+        else:
+            offsets[k] = (row * width + blocks[row].index(int(body_rank[body]))) * FREEDOMS + freedom
+    return offsets
+
+
+def _hessian_blocks(h: ca.Sparsity, rank: np.ndarray, later: Sequence[Sequence[int]]) -> dict[str, np.ndarray]:
+    """Return the arrays of a layout for the blocks of H, by name."""
+    bodies = len(rank)
+    columns = [[*(k for k, nodes in enumerate(later) if body in nodes), body] for body in range(bodies)]
+    starts = _starts(columns)
+    block_of = np.full((bodies, bodies), -1, dtype=np.int64)
+    for body, nodes in enumerate(columns):
+        block_of[body, nodes] = starts[body] + np.arange(len(nodes))
+    rows_of_h, columns_of_h = (np.array(indices, dtype=np.int64) for indices in h.get_triplet())
+    offsets = np.full(len(rows_of_h), -1, dtype=np.int64)
+    of_bodies = np.flatnonzero(np.maximum(rows_of_h, columns_of_h) < bodies * FREEDOMS)
+    i, j = rows_of_h[of_bodies], columns_of_h[of_bodies]
+    blocks = block_of[rank[i // FREEDOMS], rank[j // FREEDOMS]]
+    offsets[of_bodies] = np.where(blocks < 0, -1, (blocks * FREEDOMS + i % FREEDOMS) * FREEDOMS + j % FREEDOMS)
+    order = np.array([k for nodes in columns for k in nodes], dtype=np.int64)
+    return {"hessian_entries": offsets, "starts": starts, "columns": order, "block_of": block_of}
+
+
+def least_degree(node: int, depths: Sequence[int], neighbours: Sequence[set[int]]) -> tuple[int, ...]:
+    """Return the key of minimum-degree order, whose factors have few entries; a chain is eliminated from both ends."""
+    return len(neighbours[node]), depths[node], node
+
+
+def least_depth(node: int, depths: Sequence[int], neighbours: Sequence[set[int]]) -> tuple[int, ...]:
+    """Return the key of an order with a flat elimination tree: every other node of a chain, and so on recursively."""
+    return depths[node], len(neighbours[node]), node
+
+
+def elimination(graph: Sequence[set[int]], key: Key) -> tuple[list[int], list[list[int]]]:
+    """Return the order of the nodes, and by rank the ranks of later nodes that elimination joins to the node.
+
+    graph   the neighbours of each node
+
+    The remaining node with the smallest key comes next; its neighbours become neighbours of one another.
+    """
+    neighbours = [set(nodes) for nodes in graph]
+    depths, remaining, order, joined = [0] * len(graph), set(range(len(graph))), [], []
+    while remaining:
+        node = min(remaining, key=lambda candidate: key(candidate, depths, neighbours))
+        remaining.remove(node)
+        order.append(node)
+        joined.append(neighbours[node])
+        for neighbour in neighbours[node]:
+            neighbours[neighbour] |= neighbours[node]
+            neighbours[neighbour] -= {node, neighbour}
+            depths[neighbour] = max(depths[neighbour], depths[node] + 1)
+    rank = {node: k for k, node in enumerate(order)}
+    return order, [sorted(rank[node] for node in nodes) for nodes in joined]
