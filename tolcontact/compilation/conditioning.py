@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from tolcontact.arrays import Array, Bool, Int
 from tolcontact.compilation.qp_terms import Call, Rows
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.group_equations import GroupEquations
@@ -37,7 +36,10 @@ def conditioned(
         opening[k] = ca.sqrt(rows.compliance[k] * scale)
     A, opening, lower, length = conditioned_rows(rows, to_z, opening, system.group.length, call)
     upper = ca.SX(ca.DM(np.full(len(rows), np.inf)))
-    owners, priced = slack_owners(rows.pairs, rows.springs, pairs)
+    # Slacks of springs follow those of the pairs. The slack of a pair without rigid rows is in no row, and has no price.
+    owners, is_rigid = rows.pairs.copy(), np.ones(len(rows), dtype=bool)
+    owners[rows.springs], is_rigid[rows.springs] = pairs + np.arange(len(rows.springs)), False
+    priced = np.isin(np.arange(pairs + len(rows.springs)), owners[is_rigid])
     if rows.flexibility is not None:
         priced = priced[:pairs]
         upper = ca.vertcat(*(lower[k] if holds else np.inf for k, holds in enumerate(rows.flexibility.holds)))
@@ -52,19 +54,6 @@ def conditioned(
         "to_z": to_z,
         "length": length,
     }
-
-
-def slack_owners(
-    pairs: Int[Array, " row"], springs: Sequence[int], pair_count: int
-) -> tuple[Int[Array, " row"], Bool[Array, " slack"]]:
-    """Return the slack of each row, and which slacks have a price, from the `pairs` of the rows and the `springs` among them.
-
-    Slacks of springs follow the slacks of the pairs. The slack of a pair without rigid rows is in no row, and has no price.
-    """
-    owners, is_rigid = pairs.copy(), np.ones(len(pairs), dtype=bool)
-    owners[springs] = pair_count + np.arange(len(springs))
-    is_rigid[springs] = False
-    return owners, np.isin(np.arange(pair_count + len(springs)), owners[is_rigid])
 
 
 def conditioned_rows(rows: Rows, to_z: ca.SX, opening: ca.SX, group_length: Number, call: Call) -> list[ca.SX]:

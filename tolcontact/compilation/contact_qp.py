@@ -172,14 +172,7 @@ def contact_qp(
     locator_residual     largest misfit [mm] of exact two-sided locators at `corrected`
     """
     inputs = _inputs(nominal, group, standing, bends=flexibility is not None)
-    pairs = [nominal.pairs[index] for index in group.pairs]
-    system = GroupEquations(
-        nominal, group, method, raw=poses_of(inputs["raw"]), z=ca.SX.sym("z", FREEDOMS * len(group.free)),
-        **{name: inputs[name] for name in ("moments", "deviations", "regularization_factor")},
-        faces=[face_poses(pair, inputs["deviations"]) for pair in pairs],
-        heights=[face_heights(pair, inputs["deviations"]) for pair in pairs],
-        steps=[bilateral_steps(nominal, group.parts[locators.part], inputs["deviations"]) for locators in group.bilateral],
-    )  # fmt: skip
+    system = _equations(nominal, group, method, inputs)
     motion = system.motion(poses_of(inputs["poses"]))
     current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
     points = row_points(system, standing, inputs)
@@ -212,6 +205,18 @@ def contact_qp(
         length=float(group.length),
         flexibility=flexibility,
     )
+
+
+def _equations(nominal: Nominal, group: Group, method: Method, inputs: Mapping[str, ca.SX]) -> GroupEquations:
+    """Return the equations of a group, with symbols for its increments."""
+    pairs = [nominal.pairs[index] for index in group.pairs]
+    return GroupEquations(
+        nominal, group, method, raw=poses_of(inputs["raw"]), z=ca.SX.sym("z", FREEDOMS * len(group.free)),
+        **{name: inputs[name] for name in ("moments", "deviations", "regularization_factor")},
+        faces=[face_poses(pair, inputs["deviations"]) for pair in pairs],
+        heights=[face_heights(pair, inputs["deviations"]) for pair in pairs],
+        steps=[bilateral_steps(nominal, group.parts[locators.part], inputs["deviations"]) for locators in group.bilateral],
+    )  # fmt: skip
 
 
 def _inputs(nominal: Nominal, group: Group, standing: Standing, *, bends: bool = False) -> dict[str, ca.SX]:

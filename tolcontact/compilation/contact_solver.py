@@ -159,19 +159,18 @@ class ContactSolver:
             return outputs
         is_rough = _is_rough(outputs) | (self._kernel is not None)
         for rows in self._parts(np.flatnonzero(is_rough & np.isfinite(outputs["residual"][:, 0]))):
-            polished = self._polish(_of(problem, rows), _of(solution, rows))
-            answer = self._finished(_of(inputs, rows) | _of(problem, rows) | polished)
+            part, rough = _of(problem, rows), _of(solution, rows)
+            if self._kernel is not None:  # it exchanges wrong rows
+                pushes = -rough["lam_a"][:, : part["length"].shape[1]]
+                polished = self._kernel(part, pushes, np.zeros_like(pushes))[0]
+            else:
+                systems = self._dense_problem(part)
+                active = active_set(systems, rough, self._equalities, self._qp.slacks)
+                polished = solve_active(systems, *active, self._order)
+            answer = self._finished(_of(inputs, rows) | part | polished)
             better = answer["residual"][:, 0] < outputs["residual"][rows, 0]
             _replace(outputs, rows[better], _of(answer, better))
         return outputs
-
-    def _polish(self, problem: Arrays, solution: Arrays) -> Arrays:
-        """Return the answers of the active sets of a solver's solutions; the kernel of elastic parts exchanges wrong rows."""
-        if self._kernel is not None:
-            pushes = -solution["lam_a"][:, : problem["length"].shape[1]]
-            return self._kernel(problem, pushes, np.zeros_like(pushes))[0]
-        systems = self._dense_problem(problem)
-        return solve_active(systems, *active_set(systems, solution, self._equalities, self._qp.slacks), self._order)
 
     def _finished(self, arrays: Arrays) -> Arrays:
         """Return the outputs of `finish`; elastic parts bend by the reactions, and rows in conflict are `opened`."""

@@ -232,7 +232,12 @@ def quadratic_terms(
     if not system.method.is_exact:
         return QuadraticTerms(Q, gradient, nothing, ca.SX(size, 1), nothing, goal.scale)
     Q += rows.hollow_curvature / goal.scale
-    curvature = _lagrangian_hessian(system, motion.by(quadratic), rows.bends / goal.scale)
+    # The Hessian, at z = 0, of the Lagrangian: the objective less the reactions' work on the gaps, which is linear in X_RM. Its
+    # weights are independent of z: symbols, so that they are not differentiated.
+    weights, moved_twice = ca.SX.sym("bends", rows.bends.numel()), motion.by(quadratic)
+    work = ca.dot(weights, ca.vertcat(*(X_RM.vector() for X_RM in system.relative(moved_twice))))
+    lagrangian = system.curvature(energy(system, moved_twice).value - work)
+    curvature = ca.substitute(lagrangian, weights, rows.bends / goal.scale)
     curvature += (rows.hollow_curvature - rows.curvature) / goal.scale - Q
     # The augmented Lagrangian term of the active rows does not change the answer, and restores convexity in most cases.
     penalty = (1 + 2 * load / goal.scale / system.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
@@ -240,13 +245,6 @@ def quadratic_terms(
     opened = rows.gaps + (rows.compliance * reactions if rows.bent is None else rows.bent)  # [mm] at z = 0
     proximal_hessian = system.curvature(proximity(system, motion.poses, moved)) / system.group.length if projects else nothing
     return QuadraticTerms(Q, gradient, curvature, rows.slopes.T @ (penalty * opened), proximal_hessian, goal.scale)
-
-
-def _lagrangian_hessian(system: GroupEquations, poses: Sequence[Pose], bends: ca.SX) -> ca.SX:
-    """Return the Hessian, at z = 0, of the Lagrangian: the objective less the reactions' work on the gaps (linear in X_RM)."""
-    weights = ca.SX.sym("bends", bends.numel())  # independent of z: symbols, so that they are not differentiated
-    work = ca.dot(weights, ca.vertcat(*(X_RM.vector() for X_RM in system.relative(poses))))
-    return ca.substitute(system.curvature(energy(system, poses).value - work), weights, bends)
 
 
 def is_convex(Q: ca.SX, call: Call) -> ca.SX:

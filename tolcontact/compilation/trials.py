@@ -209,7 +209,14 @@ def measure_accuracies(
     for group in groups:
         for mover, free in enumerate(group.free):
             parts = [part for part, mobility in zip(group.parts, group.mobilities, strict=True) if mover in mobility.movers]
-            nominal_centre, span = _contact_of(nominal, group, free)
+            points = np.concatenate([
+                points
+                for pair in (nominal.pairs[k] for k in group.pairs)
+                for points, owner in ((pair.P_m, pair.moving), (pair.P_r, pair.reference))
+                if owner == free
+            ] or [nominal.parts[free].vertices])  # fmt: skip
+            nominal_centre = (points.min(axis=0) + points.max(axis=0)) / 2
+            span = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
             slopes = np.zeros((2, 3, len(initial), len(gains)))
             for kind, axis in itertools.product(range(2), range(3)):
                 moved = poses.reshape(len(poses), -1, 12).copy()
@@ -224,14 +231,3 @@ def measure_accuracies(
             sizes = np.sqrt((slopes**2).sum(axis=1))
             gains += np.nan_to_num((sizes[0] + LEVER_FACTOR / span * sizes[1]), nan=0.0, posinf=0.0).max(axis=0)
     return np.asarray(GAP_ACCURACY * np.maximum(gains, [1 / measure.unit for measure in nominal.measures]))
-
-
-def _contact_of(nominal: Nominal, group: Group, part: int) -> tuple[np.ndarray, float]:
-    """Return the nominal centre (3,) [mm] and the span [mm] of the contact points of a part."""
-    points = np.concatenate([
-        points
-        for pair in (nominal.pairs[k] for k in group.pairs)
-        for points, owner in ((pair.P_m, pair.moving), (pair.P_r, pair.reference))
-        if owner == part
-    ] or [nominal.parts[part].vertices])  # fmt: skip
-    return (points.min(axis=0) + points.max(axis=0)) / 2, float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0

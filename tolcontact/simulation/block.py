@@ -150,7 +150,10 @@ def simulate_block(
             resolved = resolver.resolve(raw, relative, inputs)
             _put(block, resolver, resolved)
             if is_placed_again:
-                _put_raw(block, resolver, changed, raw_relative, raw_inputs)
+                # Contact was resolved from handed-over poses. Welds keep no gaps before contact.
+                gaps, active = resolver.raw_contact(raw_relative[changed], raw_inputs[changed])
+                block.gap_min[changed[:, None], RAW, resolver.pairs] = gaps
+                block.active[changed[:, None], resolver.pairs] = active
             worst[resolved.touched] = np.maximum(worst[resolved.touched], resolved.state.outcome)
         for weld in nominal.welds:
             if program.bending is not None and station is not None and weld.station == station.name:
@@ -228,19 +231,3 @@ def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
     join_groups(block, touched, state)
     if resolver.flexibility is not None:
         block.load[touched[:, None], resolver.flexibility.loads] = state.multipliers[:, resolver.flexibility.load_rows]
-
-
-def _put_raw(
-    block: Block,
-    resolver: ContactResolver,
-    rows: np.ndarray,
-    relative: Float[Array, "n pair 12"],
-    inputs: Float[Array, "n input"],
-) -> None:
-    """Write gaps and active points of the raw state for rows whose contact was resolved from handed-over poses.
-
-    inputs   deviations, and 0 for the gaps of welds, which keep none before contact
-    """
-    gaps, active = resolver.raw_contact(relative[rows], inputs[rows])
-    block.gap_min[rows[:, None], RAW, resolver.pairs] = gaps
-    block.active[rows[:, None], resolver.pairs] = active

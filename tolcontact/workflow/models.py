@@ -195,26 +195,23 @@ def check_affordable(program: Program, *, samples: int, seed: int, threads: int,
 
 def _checked_seconds(program: Program, samples: int, seed: int, threads: int) -> float:
     """Return the time [s] that `samples` realizations need on `threads` threads. Raises OptionError above 30 days."""
-    seconds = _seconds_per_realization(program, seed) / threads
+    # Trials grow up to a block. Loading takes longer than a block.
+    trial, seconds = FIRST_TRIAL_ROWS, 0.0
+    list(simulate_blocks(program, samples=trial, seed=seed, threads=1))
+    while True:
+        started = time.perf_counter()
+        list(simulate_blocks(program, samples=trial, seed=seed, threads=1))
+        seconds = time.perf_counter() - started
+        if seconds > MIN_TRIAL_SECONDS or trial >= block_rows(program):
+            break
+        trial *= 8
+    seconds = seconds / trial / threads
     if seconds * samples > MAX_SECONDS:
         raise OptionError(
             f"{samples} realizations would take about {duration(seconds * samples)}; ask for at most "
             f"{int(MAX_SECONDS / seconds)}, which take {duration(MAX_SECONDS)}"
         )
     return seconds * samples
-
-
-def _seconds_per_realization(program: Program, seed: int) -> float:
-    """Return the time per realization [s], from trials of growing size, at most a block."""
-    trial = FIRST_TRIAL_ROWS
-    list(simulate_blocks(program, samples=trial, seed=seed, threads=1))  # loading takes longer than a block
-    while True:
-        started = time.perf_counter()
-        list(simulate_blocks(program, samples=trial, seed=seed, threads=1))
-        seconds = time.perf_counter() - started
-        if seconds > MIN_TRIAL_SECONDS or trial >= block_rows(program):
-            return seconds / trial
-        trial *= 8
 
 
 def duration(seconds: float) -> str:

@@ -199,15 +199,22 @@ def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupl
         touched[row].add(column // FREEDOMS)
     slack_of_row = np.full(count, -1)
     slack_of_row[rows[~of_body]] = columns[~of_body] - bodies * FREEDOMS
-    graph = _body_graph(h, bodies) if coupled else [set() for _ in range(bodies)]
-    body_order, later = elimination(graph, least_depth)
+    graph: list[set[int]] = [set() for _ in range(bodies)]  # the bodies that H couples to each body
+    for row, column in zip(*h.get_triplet(), strict=True) if coupled else ():
+        i, j = row // FREEDOMS, column // FREEDOMS
+        if i != j and max(i, j) < bodies:
+            graph[i].add(j)
+            graph[j].add(i)
+    # A flat elimination tree: every other node of a chain, and so on recursively.
+    body_order, later = elimination(graph, lambda body, depths, graph: (depths[body], len(graph[body]), body))
     if coupled:
         touched = [_with_later(body_order, later, nodes) for nodes in touched]
     joints, equation_joints = _joints(touched, slack_of_row.tolist(), count - equations)
     joint_bodies = [set().union(*(touched[row] for row in members)) for members in joints]
     adjacent = [{k for k, nodes in enumerate(joint_bodies) if k != j and nodes & joint_bodies[j]} for j in range(len(joints))]
-    # Equations come first, so that no equation is dropped because it depends on rows that may leave.
-    order, joined = elimination(adjacent, lambda j, depths, graph: (j >= equation_joints, *least_degree(j, depths, graph)))
+    # Equations come first, so that no equation is dropped because it depends on rows that may leave. Then minimum degree, since
+    # the factor has few entries; a chain is eliminated from both ends.
+    order, joined = elimination(adjacent, lambda j, depths, graph: (j >= equation_joints, len(graph[j]), depths[j], j))
     prior = [sorted(k for k, nodes in enumerate(joined) if j in nodes) for j in range(len(order))]
     members = [joints[j] for j in order]
     row_order = np.array([row for rows_of_joint in members for row in rows_of_joint], dtype=np.int64)
@@ -233,17 +240,6 @@ def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupl
 
 def _starts(lists: Sequence[Sequence[int] | set[int]]) -> np.ndarray:
     return np.cumsum([0, *map(len, lists)])
-
-
-def _body_graph(h: ca.Sparsity, bodies: int) -> list[set[int]]:
-    """Return the bodies that H couples to each body."""
-    graph: list[set[int]] = [set() for _ in range(bodies)]
-    for row, column in zip(*h.get_triplet(), strict=True):
-        i, j = row // FREEDOMS, column // FREEDOMS
-        if i != j and max(i, j) < bodies:
-            graph[i].add(j)
-            graph[j].add(i)
-    return graph
 
 
 def _with_later(order: Sequence[int], later: Sequence[Sequence[int]], bodies: set[int]) -> set[int]:
@@ -298,16 +294,6 @@ def _hessian_blocks(h: ca.Sparsity, rank: np.ndarray, later: Sequence[Sequence[i
     offsets[of_bodies] = np.where(blocks < 0, -1, (blocks * FREEDOMS + i % FREEDOMS) * FREEDOMS + j % FREEDOMS)
     order = np.array([k for nodes in columns for k in nodes], dtype=np.int64)
     return {"hessian_entries": offsets, "starts": starts, "columns": order, "block_of": block_of}
-
-
-def least_degree(node: int, depths: Sequence[int], neighbours: Sequence[set[int]]) -> tuple[int, ...]:
-    """Return the key of minimum-degree order, whose factors have few entries; a chain is eliminated from both ends."""
-    return len(neighbours[node]), depths[node], node
-
-
-def least_depth(node: int, depths: Sequence[int], neighbours: Sequence[set[int]]) -> tuple[int, ...]:
-    """Return the key of an order with a flat elimination tree: every other node of a chain, and so on recursively."""
-    return depths[node], len(neighbours[node]), node
 
 
 def elimination(graph: Sequence[set[int]], key: Key) -> tuple[list[int], list[list[int]]]:
