@@ -211,9 +211,10 @@ def _figure(value: float | None) -> str:
 def _csv(declared: DeclaredFile) -> str:
     text = io.StringIO()
     declarations = {entry.annotation.record: ("; ".join(entry.features), entry.reason) for entry in declared.annotations}
-    rows = csv.DictWriter(text, _CSV, restval=None, lineterminator="\n")
+    rows = csv.DictWriter(text, _CSV, lineterminator="\n")
     rows.writeheader()
-    for annotation in (*declared.pmi.tolerances, *declared.pmi.dimensions):
+    annotations: list[Tolerance | Dimension] = [*declared.pmi.tolerances, *declared.pmi.dimensions]
+    for annotation in annotations:
         features, reason = declarations.get(annotation.record, ("", ""))
         row = {
             "number": annotation.number, "record": annotation.record, "kind": annotation.kind, "name": annotation.name,

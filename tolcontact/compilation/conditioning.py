@@ -1,6 +1,7 @@
 """The conditioned QP and its outcome: poses, reactions and residuals.
 
-Its objective has unit diagonal blocks, its rows have length 1, and slacks make it feasible."""
+Its objective has unit diagonal blocks, its rows have length 1, and slacks make it feasible.
+"""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -27,19 +28,19 @@ def conditioned(
 
     The `misfit` (locator, 1) [mm] of exact two-sided locators gives the last rows, which are equations. A compliant row has its
     own slack without a price, after the slacks of the pairs. With the opening sqrt(C), this slack adds C times the multiplier
-    to the gap. Slacks of elastic parts are left out, see ElasticColumns. `scale` is the scale of the objective.
+    to the gap. Slacks of elastic parts are left out, see ContactQP. `scale` is the scale of the objective.
     """
-    pairs, equations = len(system.group.pairs), misfit.numel()
+    pairs, springs, equations = len(system.group.pairs), rows.springs, misfit.numel()
     H, to_z = unit_blocks(Q, call)
     opening = ca.SX.ones(len(rows)) * SLACK
-    for k in rows.springs:
+    for k in springs:
         opening[k] = ca.sqrt(rows.compliance[k] * scale)
     A, opening, lower, length = conditioned_rows(rows, to_z, opening, system.group.length, call)
     upper = ca.SX(ca.DM(np.full(len(rows), np.inf)))
     # Slacks of springs follow those of the pairs. The slack of a pair without rigid rows is in no row, and has no price.
     owners, is_rigid = rows.pairs.copy(), np.ones(len(rows), dtype=bool)
-    owners[rows.springs], is_rigid[rows.springs] = pairs + np.arange(len(rows.springs)), False
-    priced = np.isin(np.arange(pairs + len(rows.springs)), owners[is_rigid])
+    owners[springs], is_rigid[springs] = pairs + np.arange(len(springs)), False
+    priced = np.isin(np.arange(pairs + len(springs)), owners[is_rigid])
     if rows.flexibility is not None:
         priced = priced[:pairs]
         upper = ca.vertcat(*(lower[k] if holds else np.inf for k, holds in enumerate(rows.flexibility.holds)))

@@ -150,9 +150,11 @@ class _Pair:
 
     def call(self, call: Call, name: str, expression: Callable[[Inputs], Sequence[ca.SX]], inputs: Inputs) -> Sequence[ca.SX]:
         """Return the results of an expression of inputs by name."""
-        return call(
-            name, lambda *symbols: expression(dict(zip(inputs, symbols, strict=True))), *inputs.values(), kind=self.kind
-        )
+
+        def results(*symbols: ca.SX) -> Sequence[ca.SX]:
+            return expression(dict(zip(inputs, symbols, strict=True)))
+
+        return call(name, results, *inputs.values(), kind=self.kind)
 
     def linearized(self, inputs: Inputs) -> list[ca.SX]:
         """Return X_RM (12, 1) to first order in the increments."""

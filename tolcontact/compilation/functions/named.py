@@ -183,7 +183,7 @@ class NamedFunction:
                 name = f"{key}-evaluations"
                 stored = code_cache.load(name) or b""
                 self._evaluations = [int(stored) if stored.isdigit() else 0]
-                weakref.finalize(self, lambda number: code_cache.write(name, str(*number).encode()), self._evaluations)
+                weakref.finalize(self, lambda number: code_cache.write(name, str(number[0]).encode()), self._evaluations)
             self._evaluations[0] += count
             self._may_be_compiled = self._evaluations[0] <= self._min_calls
             return not self._may_be_compiled

@@ -4,6 +4,7 @@ Its layout of a QP states the bodies that each row touches, and the elimination 
 share a slack (the rows of a contact pair), or a set of equations that touch the same bodies.
 """
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -60,9 +61,6 @@ class Layout(NamedTuple):
     block_of: np.ndarray
 
 
-Layouts = dict[bool, Layout]  # by whether H couples bodies
-
-
 class GraphChoice(SolverChoice):
     """The choice of the solver on the graph of bodies."""
 
@@ -81,17 +79,15 @@ class GraphSolver:
     """A solver of QPs with the sparsities of h, g, a and lba. Threads must not share it.
 
     The last `equations` rows are equations. The last `slacks` variables are not negative, with unit entries in h. Twins share
-    their `layouts`, which are created on demand.
+    their layouts, which are created on demand.
 
     remembers   whether it starts each problem from the previous answer: never
     """
 
     remembers = False
 
-    def __init__(
-        self, sparsities: Mapping[str, ca.Sparsity], *, slacks: int, equations: int, layouts: Layouts | None = None
-    ) -> None:
-        self._layouts = {} if layouts is None else layouts
+    def __init__(self, sparsities: Mapping[str, ca.Sparsity], *, slacks: int, equations: int) -> None:
+        self._layouts: dict[bool, Layout] = {}  # by whether H couples bodies
         self._sparsities, self._slacks, self._equations = dict(sparsities), slacks, equations
         rows, columns = (np.array(indices) for indices in sparsities["h"].get_triplet())
         self._identity = (rows == columns).astype(float)
@@ -126,7 +122,9 @@ class GraphSolver:
 
     def twin(self) -> "GraphSolver":
         """Return an equal solver with buffers of its own."""
-        return GraphSolver(self._sparsities, slacks=self._slacks, equations=self._equations, layouts=self._layouts)
+        twin = copy.copy(self)
+        twin._buffers = {}
+        return twin
 
     def _full(self, name: str, stored: np.ndarray) -> np.ndarray:
         """Return all entries of a vector, (realization, entry)."""
