@@ -43,8 +43,8 @@ NOT_IN = {
 # Who may import a library by a call, when it is first needed: it is optional, or slow to import.
 LAZY = {
     "cloudpickle": ("simulation/packing.py",),
-    "dask": ("simulation/cluster.py", "simulation/lazy.py"),
-    "dask.array": ("simulation/lazy.py",),
+    "dask": ("simulation/cluster.py", "simulation/packing.py"),
+    "dask.array": ("simulation/packing.py",),
     "distributed": ("simulation/cluster.py",),
     "pandas": ("declaration/measured_table.py", "declaration/stack.py"),
     "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files

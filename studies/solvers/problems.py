@@ -30,7 +30,7 @@ from scipy.optimize import nnls
 import tolcontact as tc
 from studies.cost.scenes import slab
 from studies.tables import Table, write
-from tolcontact.compilation import conic_plugin, program as compilation
+from tolcontact.compilation import program as compilation, solvers as conic
 from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.solvers import SOLVERS, usable_solvers
 from tolcontact.mechanics.quiet import quiet
@@ -79,21 +79,21 @@ def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
     kept = compilation.standing_points  # type: ignore[attr-defined, method-assign]
     compilation.standing_points = lambda pair, *_: np.arange(len(pair.P_m))  # type: ignore[attr-defined, method-assign]
     found: list[Problem] = []
-    solve = conic_plugin.ConicSolver.__call__
+    solve = conic.ConicSolver.__call__
 
     def record(self, problem, reactions, slacks):
         if not found:
-            arrays = dict(zip("hgabc", (problem[name] for name in conic_plugin.QP), strict=True))
+            arrays = dict(zip("hgabc", (problem[name] for name in conic.QP), strict=True))
             found.extend({name: values[k].copy() for name, values in arrays.items()} for k in range(len(reactions)))
         return solve(self, problem, reactions, slacks)
 
-    conic_plugin.ConicSolver.__call__ = record  # type: ignore[method-assign]
+    conic.ConicSolver.__call__ = record  # type: ignore[method-assign]
     try:
         program = tc.build(assembly, solver="daqp", method=tc.Method(resolution="linearized"))
         simulate_block(program, draw(program.nominal, seed=1, start=0, stop=realizations))
     finally:
         compilation.standing_points = kept  # type: ignore[attr-defined, method-assign]
-        conic_plugin.ConicSolver.__call__ = solve  # type: ignore[method-assign]
+        conic.ConicSolver.__call__ = solve  # type: ignore[method-assign]
     functions = program.groups[0].qp
     h, a = functions.sparsity("h"), functions.sparsity("a")
     for one in found:

@@ -22,8 +22,7 @@ from tolcontact.statistics.linear_shares import joined_columns
 from tolcontact.variation import GivenDraws
 from tolcontact.variation.draws import Draws
 from tolcontact.vocabulary import GROUPED_BY
-from tolcontact.workflow.forecast import check_affordable
-from tolcontact.workflow.models import Choice, Model, check_counts, program_of
+from tolcontact.workflow.models import Choice, Model, check_affordable, check_counts, program_of
 
 MAX_ROWS_OF_BODIES = 8192  # realizations of a block, times the bodies that contact couples: a block ends within seconds
 MIN_BLOCKS = 8  # for few realizations, so that they occupy all processors

@@ -7,7 +7,7 @@ import xarray as xr
 from tolcontact.archive import method_of_run, model_of
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import compile_program
-from tolcontact.compilation.other_flexibility import STIFFER, overheld, stiffer
+from tolcontact.compilation.program import STIFFER, overheld, stiffer
 from tolcontact.discretization import discretize
 from tolcontact.realizations import finished
 from tolcontact.simulation import simulate_block

@@ -20,8 +20,8 @@ from tolcontact.features import FaceDeviation
 from tolcontact.geometry import known_surfaces, surface_arrays
 from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, coordinate_spacing
 from tolcontact.mechanics.displacement import central_moments
-from tolcontact.simulation.locator_offsets import locator_variations
-from tolcontact.simulation.other_objectives import compared_objectives, empty_by_objective
+from tolcontact.simulation.bodies import locator_variations
+from tolcontact.simulation.run_checks import compared_objectives, empty_by_objective
 from tolcontact.vocabulary import ArchiveVariable
 
 

@@ -1,4 +1,7 @@
-"""The application: shared options of commands, and exit codes."""
+"""The application: its commands, their shared options, and exit codes.
+
+The module of a command is imported when the command is resolved, so `--help` imports none of them.
+"""
 
 import inspect
 import shutil
@@ -10,8 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-from tolcontact.cli.commands import Commands
+from tolcontact import cli, interrupts, shape_worker
+from tolcontact.cli import analyses
 from tolcontact.errors import OptionError, TolcontactError
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.system import streams
@@ -22,6 +27,69 @@ if TYPE_CHECKING:
     from tolcontact.declaration import Assembly
 
 MIN_COLUMNS = 40  # of a terminal: warnings are wrapped to no fewer
+# The module of each command in this folder, and its line in the list of commands.
+COMMANDS = {
+    **{command.name: ("analysis_command", command.purpose) for command in analyses.COMMANDS},
+    "summary": ("archives", "Print the statistics of an archive."),
+    "report": ("archives", "Write a self-contained page for a browser from an archive, or a spreadsheet of its tables."),
+    "compare": ("run", "Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other."),
+    "new": ("models", "Write a small model with comments as a starting point."),
+    "guide": ("models", "Open the installed guide in the browser: tutorials, how-tos, theory, reference, glossary."),
+    "check": ("models", "Check a model and its options without a run; list all faults and probable mistakes."),
+    "view": (
+        "models",
+        "Show an assembly before a run: faces, features with their tolerances, locators, contact points and nominal gaps.",
+    ),
+    "pmi": (
+        "step_files",
+        "List the tolerances, dimensions and datums of a STEP file of AP242, and how features declare them. In mm and rad.",
+    ),
+    "run": ("run", "Simulate a model with and without contact, and print the statistics of its measurements."),
+    "bodies": (
+        "step_files",
+        "List the bodies of a STEP file in its product tree: numbers, names, sizes in mm, faces; and its units of length.",
+    ),
+    "faces": (
+        "step_files",
+        "List the faces of a body of a STEP file: numbers (tc.select.Brep), kinds, axes, radii, areas, slots, hole patterns.",
+    ),
+}
+
+
+class Commands(TyperGroup):
+    """The commands. A command that is stopped ends with a message."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.commands = {name: TyperCommand(name, help=purpose) for name, (_, purpose) in COMMANDS.items()}
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        name, command, arguments = super().resolve_command(ctx, args)
+        shape_worker.start_early(arguments)
+        return name, command and declared_command(str(name)), arguments
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            with interrupts.stoppable():
+                return super().invoke(ctx)
+        except KeyboardInterrupt:
+            interrupts.end("stopped")
+        finally:
+            shape_worker.end_unused()
+
+
+def declared_command(name: str) -> Any:
+    """Return a command with its options. The module that declares the command is imported."""
+    module, _ = COMMANDS[name]
+    with interrupts.stoppable(at_once=True):  # in native modules that are being loaded an exception may be fatal
+        getattr(cli, module)  # its import declares the command
+    return next(
+        typer.main.get_command_from_info(
+            info, pretty_exceptions_short=app.pretty_exceptions_short, rich_markup_mode=app.rich_markup_mode
+        )
+        for info in app.registered_commands
+        if name == (info.name or getattr(info.callback, "__name__", ""))
+    )
 
 
 app: typer.Typer = typer.Typer(
@@ -62,8 +130,7 @@ def or_(names: Iterable[str]) -> str:
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly(), or a JSON model.")]
 AnalysedModel = Annotated[
-    Path,
-    typer.Argument(metavar="MODEL.py|RUN.nc", help="Model script, JSON model, or the archive of a run, for its model."),
+    Path, typer.Argument(metavar="MODEL.py|RUN.nc", help="Model script, JSON model, or the archive of a run, for its model.")
 ]
 StepFile = Annotated[Path, typer.Argument(metavar="FILE.stp", help="STEP file.")]
 Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
@@ -75,8 +142,7 @@ Resolution = Annotated[
     typer.Option(help=f"One linear step, or steps until all gaps are open: {or_(RESOLUTIONS)}. Default: the model's."),
 ]
 Objective = Annotated[
-    str | None,
-    typer.Option(help=f"Quantity that the pose with contact minimizes: {or_(OBJECTIVES)}. Default: the model's."),
+    str | None, typer.Option(help=f"Quantity that the pose with contact minimizes: {or_(OBJECTIVES)}. Default: the model's.")
 ]
 AsJson = Annotated[bool, flag("--json", "Print the result as JSON.")]
 AsCsv = Annotated[bool, flag("--csv", "Print the estimates as CSV.")]
@@ -84,8 +150,7 @@ Into = Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also store t
 Overwrite = Annotated[bool, flag("--overwrite", "Replace existing archives, pages and spreadsheets, whoever wrote them.")]
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Number of worker processes (with dask).")]
 Scheduler = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786."),
+    str | None, typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786.")
 ]
 Minutes = Annotated[
     float | None, typer.Option(help="Time after which the answer so far is printed, which says so; so does Ctrl-C.")

@@ -1,13 +1,10 @@
 """tolcontact summary, tolcontact report."""
 
-from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 import typer
-import xarray as xr
 
 from tolcontact import archive as archives, report as reports, workflow
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, echo, examples, flag, only_one
@@ -24,8 +21,8 @@ from tolcontact.cli.output import (
     print_data,
     print_summary,
     title_entries,
+    waiting,
 )
-from tolcontact.cli.progress import waiting
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
 
@@ -56,17 +53,6 @@ def summary(
         print_summary(estimates, is_whole=whole)
 
 
-def _first_order_variances(results: xr.DataTree) -> np.ndarray:
-    """Return first-order variances of a run. Few reports need the model, and all that it takes to build it."""
-    variances: np.ndarray = import_module("tolcontact.analyses.first_order").first_order_variances(results)
-    return variances
-
-
-def _rigid_values(results: xr.DataTree) -> Any:
-    """Return values of a run with rigid parts in place of elastic ones."""
-    return import_module("tolcontact.analyses.rigid_parts").rigid_values(results)
-
-
 @app.command(epilog=examples("report run.nc", "report run.nc --out page.html", "report run.nc --xlsx tables.xlsx"))
 def report(
     archive: Archive,
@@ -90,8 +76,11 @@ def report(
     with waiting(f"writing the report of {archive}"), archives.open_archive(archive) as results:
         summary, titles = workflow.summarize(results), title_block_of(results.attrs).overridden(entries)
         if page is not None:
-            variances, rigid = partial(_first_order_variances, results), partial(_rigid_values, results)
-            reports.write_page(results, summary, page, titles, variances, rigid)
+            reports.write_page(  # few reports need the model, and all that it takes to build it
+                results, summary, page, titles,
+                lambda: import_module("tolcontact.analyses.first_order").first_order_variances(results),
+                lambda: import_module("tolcontact.analyses.rigid_parts").rigid_values(results),
+            )  # fmt: skip
         if xlsx is not None:
             reports.write_spreadsheet(results, summary, xlsx, titles)
     for kind, path in (("report", page), ("spreadsheet", xlsx)):

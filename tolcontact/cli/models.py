@@ -11,8 +11,7 @@ import typer
 
 from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
-from tolcontact.cli.output import check_outputs
-from tolcontact.cli.progress import waiting
+from tolcontact.cli.output import check_outputs, waiting
 from tolcontact.cli.step_files import without_annotations
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP
@@ -89,26 +88,22 @@ def check(
     except ModelError as error:
         common.show_warnings(doubts)
         if view and assembly is not None:
-            _open_view(assembly, None, error.faults, temporary_page(model))
+            _open_view(assembly, None, error.faults, model)
         if drawing and assembly is not None and (nominal := nominal_and_faults(assembly)[0]):
             _print_remarks(nominal)
         raise
     if view:
-        _open_view(assembly, program.nominal, (), temporary_page(model))
+        _open_view(assembly, program.nominal, (), model)
     common.echo(program.nominal.assembly)
     for part in program.nominal.last_parts:
         size = " x ".join(f"{length:.4g}" for length in part.body.extents.round(9))
         common.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
-    for line in (*program.elastic_parts_in_words, *(f"  {remark}" for remark in elastic)):
+    pairs = program.nominal.pairs
+    lines = [*program.elastic_parts_in_words, *(f"  {remark}" for remark in elastic)]
+    lines += [f"contact {pair.name}: {program.contact_in_words(k)}" for k, pair in enumerate(pairs)]
+    lines += [*program.draws.in_words, *filter(None, [program.stored_coordinates])]
+    for line in lines if program.nominal.assembly.forces or all(pair.stays.all() for pair in pairs) else [*lines, PRESS]:
         common.echo(f"  {line}")
-    for k, pair in enumerate(program.nominal.pairs):
-        common.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
-    for line in program.draws.in_words:
-        common.echo(f"  {line}")
-    if program.stored_coordinates:
-        common.echo(f"  {program.stored_coordinates}")
-    if not program.nominal.assembly.forces and not all(pair.stays.all() for pair in program.nominal.pairs):
-        common.echo(f"  {PRESS}")
     if drawing:
         _print_remarks(program.nominal)
     common.show_warnings(doubts)
@@ -137,19 +132,23 @@ def _print_remarks(nominal: Nominal) -> None:
         common.echo(f"drawing: {remark}")
 
 
-def _open_view(model: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
-    """Write the view of a model, and open it in the browser."""
-    write_view(model, nominal, faults, path)
-    common.echo(f"page: {path}")
-    typer.launch(str(path))
+def _open_view(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str], model: Path) -> None:
+    """Write the view of an assembly, and open it in the browser."""
+    page = temporary_page(model)
+    write_view(assembly, nominal, faults, page)
+    _open_page(page)
+
+
+def _open_page(page: Path) -> None:
+    common.echo(f"page: {page}")
+    typer.launch(str(page))
 
 
 @common.app.command(epilog=common.examples("view model.py", "view parts.stp", "view model.py --out page.html"))
 def view(
     source: Annotated[Path, typer.Argument(metavar="MODEL|FILE.nc|FILE.stp", help="A model, an archive, or a STEP file.")],
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.html", help="Page to write. Default: a temporary page, opened in the browser."),
+        Path | None, typer.Option(metavar="FILE.html", help="Page to write. Default: a temporary page, opened in the browser.")
     ] = None,
     overwrite: common.Overwrite = False,
 ) -> None:
@@ -178,9 +177,7 @@ def view(
 @common.app.command(epilog=common.examples("guide"))
 def guide() -> None:
     """Open the installed guide in the browser: tutorials, how-tos, theory, reference, glossary."""
-    page = write_guide(temporary_page(Path("guide")).parent)
-    common.echo(f"page: {page}")
-    typer.launch(str(page))
+    _open_page(write_guide(temporary_page(Path("guide")).parent))
 
 
 def temporary_page(source: Path) -> Path:

@@ -18,8 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tolcontact.cli.app import AsJson, StepFile, app, echo, examples, flag, only_one
-from tolcontact.cli.output import console
-from tolcontact.cli.progress import waiting
+from tolcontact.cli.output import console, waiting
 from tolcontact.errors import OptionError
 from tolcontact.geometry import bodies_in, faces_in, group_lines
 from tolcontact.geometry.listing import FacesOfRecords
@@ -118,23 +117,18 @@ def _print_tables(declared: DeclaredFile) -> None:
 def _sections(declared: DeclaredFile) -> Iterator[RenderableType]:
     """Yield the tables with their titles. Tables without rows are left out."""
     information = declared.pmi
-    tolerances = [_tolerance_row(tolerance, declared) for tolerance in information.tolerances[:MAX_ROWS]]
-    dimensions = [_dimension_row(dimension, declared) for dimension in information.dimensions[:MAX_ROWS]]
-    datums = [_datum_row(datum, declared) for datum in information.datums[:MAX_ROWS]]
-    for title, columns, rows, count in (
-        ("tolerances [mm]", _TOLERANCES, tolerances, len(information.tolerances)),
-        ("dimensions [mm]", _DIMENSIONS, dimensions, len(information.dimensions)),
-        ("datums", _DATUMS, datums, len(information.datums)),
+    for title, columns, annotations in (
+        ("tolerances [mm]", _TOLERANCES, information.tolerances),
+        ("dimensions [mm]", _DIMENSIONS, information.dimensions),
+        ("datums", _DATUMS, information.datums),
     ):
-        if rows:
+        if annotations:
             yield Text(f"\n{title}", style="bold")
-            yield _table(columns, rows)
-        if count > len(rows):
-            yield Text(f"and {count - len(rows)} more, which --json lists")
-    listed = [(row.face_records, row.other_records) for row in information.tolerances]
-    listed += [(row.face_records, row.other_records) for row in information.dimensions]
-    listed += [(row.face_records, row.other_records) for row in information.datums]
-    if any(items and not records for records, items in listed):
+            yield _table(columns, [_row(annotation, declared) for annotation in annotations[:MAX_ROWS]])
+        if len(annotations) > MAX_ROWS:
+            yield Text(f"and {len(annotations) - MAX_ROWS} more, which --json lists")
+    listed: list[Annotation] = [*information.tolerances, *information.dimensions, *information.datums]
+    if any(annotation.other_records and not annotation.face_records for annotation in listed):
         yield Text("\nin parentheses: edges, curves and points, where the file states no faces")
     bare = sum(not tolerance.face_records for tolerance in information.tolerances)
     if bare:
@@ -170,49 +164,33 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     """Return a table with wrapped cells that are never cut."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
     for column in columns:
-        is_figure = column in ("value", "nominal")
-        is_short = column in ("", "limits")
-        width = MIN_WIDTHS.get(column)
-        if is_figure:
-            table.add_column(column, justify="right", no_wrap=True, min_width=width)
+        if column in ("value", "nominal"):
+            table.add_column(column, justify="right", no_wrap=True)
         else:
-            table.add_column(column, no_wrap=is_short, overflow="fold", min_width=width)
+            is_short = column in ("", "limits")
+            table.add_column(column, no_wrap=is_short, overflow="fold", min_width=MIN_WIDTHS.get(column))
     for row in rows:
         table.add_row(*map(Text, row))
     return table
 
 
-def _tolerance_row(tolerance: Tolerance, declared: DeclaredFile) -> tuple[str, ...]:
-    return (
-        str(tolerance.number), tolerance.kind or "not stated", _figure(tolerance.value), tolerance.details,
-        tolerance.datum_system, _faces(tolerance.face_records, tolerance.other_records, declared.faces),
-        _features(tolerance, declared),
-    )  # fmt: skip
-
-
-def _dimension_row(dimension: Dimension, declared: DeclaredFile) -> tuple[str, ...]:
-    places = _faces(dimension.face_records, dimension.other_records, declared.faces)
-    if dimension.end_face_records or dimension.end_other_records:
-        places += f" to {_faces(dimension.end_face_records, dimension.end_other_records, declared.faces)}"
-    limits = f"{_figure(dimension.lower)} to {_figure(dimension.upper)}".strip()
-    unit = "" if dimension.unit in ("mm", "") else f" {dimension.unit}"
-    return (
-        str(dimension.number), shown(dimension.name) or dimension.kind, f"{_figure(dimension.nominal)}{unit}",
-        "" if limits == "to" else limits, dimension.details, places, _features(dimension, declared),
-    )  # fmt: skip
-
-
-def _datum_row(datum: Datum, declared: DeclaredFile) -> tuple[str, ...]:
-    targets = ", ".join(map(str, datum.targets))
-    places = _faces(datum.face_records, datum.other_records, declared.faces)
-    return shown(datum.letter), places, targets, _features(datum, declared)
-
-
-def _features(annotation: Annotation, declared: DeclaredFile) -> str:
-    """Return the names of the features that declare an annotation; a dash if none does."""
+def _row(annotation: Annotation, declared: DeclaredFile) -> tuple[str, ...]:
+    """Return the cells of an annotation, in the columns of its table."""
+    places = _faces(annotation.face_records, annotation.other_records, declared.faces)
     names = next((entry.features for entry in declared.annotations if entry.annotation is annotation), ())
     more = f", and {len(names) - MAX_FEATURES} more" if len(names) > MAX_FEATURES else ""
-    return shown(", ".join(names[:MAX_FEATURES])) + more if names else "-"
+    features = shown(", ".join(names[:MAX_FEATURES])) + more if names else "-"
+    if isinstance(annotation, Datum):
+        return shown(annotation.letter), places, ", ".join(map(str, annotation.targets)), features
+    if isinstance(annotation, Tolerance):
+        kind, value, system = annotation.kind or "not stated", _figure(annotation.value), annotation.datum_system
+        return str(annotation.number), kind, value, annotation.details, system, places, features
+    if annotation.end_face_records or annotation.end_other_records:
+        places += f" to {_faces(annotation.end_face_records, annotation.end_other_records, declared.faces)}"
+    limits = f"{_figure(annotation.lower)} to {_figure(annotation.upper)}".strip()
+    unit = "" if annotation.unit in ("mm", "") else f" {annotation.unit}"
+    name, nominal = shown(annotation.name) or annotation.kind, f"{_figure(annotation.nominal)}{unit}"
+    return str(annotation.number), name, nominal, "" if limits == "to" else limits, annotation.details, places, features
 
 
 def _faces(records: Sequence[int], others: Sequence[int], faces: FacesOfRecords) -> str:
@@ -232,25 +210,31 @@ def _figure(value: float | None) -> str:
 
 def _csv(declared: DeclaredFile) -> str:
     text = io.StringIO()
-    information, faces = declared.pmi, declared.faces
     declarations = {entry.annotation.record: ("; ".join(entry.features), entry.reason) for entry in declared.annotations}
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(_CSV)
-    for tolerance in information.tolerances:
-        rows.writerow(map(csv_cell, (
-            "tolerance", tolerance.number, tolerance.record, tolerance.kind, tolerance.name, tolerance.value, None, None,
-            "mm", tolerance.zone, tolerance.details, tolerance.datum_system, tolerance.refines,
-            _numbers(tolerance.face_records), _numbers(tolerance.other_records), None, None,
-            _named(tolerance.face_records, faces), None, *declarations.get(tolerance.record, ("", "")),
-        )))  # fmt: skip
-    for dimension in information.dimensions:
-        rows.writerow(map(csv_cell, (
-            "dimension", dimension.number, dimension.record, dimension.kind, dimension.name, dimension.nominal,
-            dimension.lower, dimension.upper, dimension.unit, None, dimension.details, None, None,
-            _numbers(dimension.face_records), _numbers(dimension.other_records), _numbers(dimension.end_face_records),
-            _numbers(dimension.end_other_records), _named(dimension.face_records, faces),
-            _named(dimension.end_face_records, faces), *declarations.get(dimension.record, ("", "")),
-        )))  # fmt: skip
+    rows = csv.DictWriter(text, _CSV, lineterminator="\n")
+    rows.writeheader()
+    annotations: list[Tolerance | Dimension] = [*declared.pmi.tolerances, *declared.pmi.dimensions]
+    for annotation in annotations:
+        features, reason = declarations.get(annotation.record, ("", ""))
+        row = {
+            "number": annotation.number, "record": annotation.record, "kind": annotation.kind, "name": annotation.name,
+            "details": annotation.details, "face_records": _numbers(annotation.face_records),
+            "other_records": _numbers(annotation.other_records), "faces": _named(annotation.face_records, declared.faces),
+            "features": features, "reason": reason,
+        }  # fmt: skip
+        if isinstance(annotation, Tolerance):
+            row |= {
+                "type": "tolerance", "value": annotation.value, "unit": "mm", "zone": annotation.zone,
+                "datums": annotation.datum_system, "refines": annotation.refines,
+            }  # fmt: skip
+        else:
+            row |= {
+                "type": "dimension", "value": annotation.nominal, "lower": annotation.lower, "upper": annotation.upper,
+                "unit": annotation.unit, "end_face_records": _numbers(annotation.end_face_records),
+                "end_other_records": _numbers(annotation.end_other_records),
+                "end_faces": _named(annotation.end_face_records, declared.faces),
+            }  # fmt: skip
+        rows.writerow({name: csv_cell(row.get(name)) for name in _CSV})
     return text.getvalue()
 
 

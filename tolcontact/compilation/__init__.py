@@ -3,9 +3,9 @@
 .. include:: ../guide/compilation.md
 """
 
-from tolcontact.compilation.contact_rows import MANY_SLOTS
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.program import ContactGroup, Program, compile_program
+from tolcontact.compilation.qp_terms import MANY_SLOTS
 from tolcontact.compilation.solver import ACCURACY
 from tolcontact.compilation.solvers import usable_solvers
 

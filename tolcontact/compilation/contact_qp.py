@@ -11,19 +11,24 @@ poses; without forces, it is zero in the raw state. h are the two-sided locators
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from tolcontact.compilation.calls import Call, FunctionCalls, inline
-from tolcontact.compilation.conditioning import conditioned
-from tolcontact.compilation.contact_rows import contact_rows, row_points, spring_energy
-from tolcontact.compilation.elastic_columns import ElasticColumns
+from tolcontact.compilation.conditioning import conditioned, outcome
 from tolcontact.compilation.functions import NamedFunction
-from tolcontact.compilation.outcome import outcome
 from tolcontact.compilation.pair_terms import is_summed, summed_terms
-from tolcontact.compilation.quadratic_terms import quadratic_terms
+from tolcontact.compilation.qp_terms import (
+    Call,
+    FunctionCalls,
+    contact_rows,
+    inline,
+    quadratic_terms,
+    row_points,
+    spring_energy,
+)
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS, linear, published, rigid
 from tolcontact.mechanics.displacement import MOMENTS
@@ -60,7 +65,13 @@ class ContactQP:
     has_springs  whether any row is compliant
     equations    number of equations: the QP's last rows, for two-sided locators that the objective makes exact
     standing     for each pair of the group the contact points that always have a row, or the number of its slots
-    elastic      the columns of elastic parts, which `assemble` leaves out; None without elastic parts
+    scale        multipliers times this are reactions, in the units of the objective; NaN if it differs by realization
+    length       [mm] of the group
+    flexibility  of the rows; None without elastic parts
+
+    Elastic parts bend by slacks s without bounds, which open many rows. With L L' = C they open the rows by L s and cost s's/2,
+    so that s = L'l for the reactions l, and the gaps open by C l. C is the same in all realizations. So `assemble` leaves these
+    columns out, `finish` judges answers by C l, and plugins get L.
     """
 
     assemble: ca.Function
@@ -71,17 +82,14 @@ class ContactQP:
     has_springs: bool
     equations: int
     standing: Standing
-    elastic: ElasticColumns | None = None
-
-    @property
-    def flexibility(self) -> Flexibility | None:
-        """The flexibility of the rows; None without elastic parts."""
-        return None if self.elastic is None else self.elastic.flexibility
+    scale: float
+    length: float
+    flexibility: Flexibility | None = None
 
     @property
     def free_slacks(self) -> int:
-        """The number of slacks that are not bounded, the last of them all."""
-        return 0 if self.elastic is None else len(self.elastic.flexibility.rows)
+        """The number of slacks of elastic parts: the last of all variables, without bounds."""
+        return 0 if self.flexibility is None else len(self.flexibility.rows)
 
     @property
     def max_batch(self) -> int:
@@ -95,14 +103,35 @@ class ContactQP:
         dense = (NamedFunction.dense(function) for function in (self.energy, self.relate))
         return Evaluators(NamedFunction(self.assemble), NamedFunction(self.finish), *dense)
 
+    @cached_property
+    def _flexible_entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Row, column and value of the entries of L, column by column, for multipliers of rows that are not scaled."""
+        assert self.flexibility is not None
+        L = self.flexibility.factor
+        columns, rows = np.nonzero(L.T)
+        return self.flexibility.rows[rows], columns, L[rows, columns] * np.sqrt(self.scale)
+
     def sparsity(self, name: str) -> ca.Sparsity:
         """Return the sparsity of an output of `assemble`, with the columns of elastic parts."""
-        sparsity = self.assemble.sparsity_out(name)
-        return sparsity if self.elastic is None else self.elastic.sparsity(name, sparsity)
+        sparsity, count = self.assemble.sparsity_out(name), self.free_slacks
+        if not count or name not in ("h", "g", "a"):
+            return sparsity
+        if name == "h":
+            return ca.diagcat(sparsity, ca.Sparsity.diag(count))
+        if name == "g":
+            return ca.vertcat(sparsity, ca.Sparsity.dense(count, 1))
+        rows, columns, _ = self._flexible_entries
+        starts = np.searchsorted(columns, np.arange(count + 1))
+        return ca.horzcat(sparsity, ca.Sparsity(sparsity.size1(), count, starts.tolist(), rows.tolist()))
 
     def whole(self, problem: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
         """Return the outputs of `assemble` (realization, entry) with the columns of elastic parts."""
-        return problem if self.elastic is None else self.elastic.joined(problem)
+        if self.flexibility is None:
+            return problem
+        rows, _, values = self._flexible_entries
+        ones = np.ones((len(problem["h"]), self.free_slacks))
+        added = {"h": ones, "g": 0 * ones, "a": values / problem["length"][:, rows]}
+        return dict(problem) | {name: np.concatenate([problem[name], entries], axis=1) for name, entries in added.items()}
 
     @property
     def spans(self) -> list[slice]:
@@ -172,7 +201,9 @@ def contact_qp(
         has_springs=group.has_springs,
         equations=exact.numel(),
         standing=standing,
-        elastic=None if flexibility is None else ElasticColumns(flexibility, float(terms.scale), float(group.length)),
+        scale=float(terms.scale) if terms.scale.is_constant() else np.nan,
+        length=float(group.length),
+        flexibility=flexibility,
     )
 
 

@@ -2,22 +2,27 @@
 
 import copy
 
+import casadi as ca
 import numpy as np
 
-from tolcontact.arrays import Array, Bool, Float
-from tolcontact.compilation.active_set import ActiveSet, band_order
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.functions import flat
+from tolcontact.compilation.polish_kernel import solve_conditions
 from tolcontact.compilation.solver import ACCURACY, Solver, SolverChoice
 from tolcontact.compilation.solvers import SOLVERS
+from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.pose import ENTRIES
 
 MAX_DENSE_ENTRIES = 4_000_000  # of the linear systems that are solved together
 POLISHED_RESIDUAL = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is rough
 SMALL_STEP, SMALL_STEP_RESIDUAL = 1e-3, 1e-2 * ACCURACY  # mm: limits for small steps, where noise matters
 CONFLICT_SHARE = 1e-3  # of the slack that remains if rows contradict each other: a smaller residual needs no other solver
+COMPLIANCE = 1e-9  # of the rows, so that dependent rows have a solution; iterative refinement removes its effect
+REFINEMENTS = 4
 
 Arrays = dict[str, Float[Array, "_ _"]]  # by name, (realization, entry)
+Problem = dict[str, Float[Array, "QP ..."]]
 
 
 class ContactSolver:
@@ -26,9 +31,9 @@ class ContactSolver:
     def __init__(self, qp: ContactQP, choice: SolverChoice) -> None:
         self._qp, self._choice = qp, choice
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
-        self._kernel = None if qp.elastic is None else SOLVERS["graph"].solver(qp)
+        self._kernel = None if qp.flexibility is None else SOLVERS["graph"].solver(qp)
         h, a = (qp.assemble.sparsity_out(name) for name in ("h", "a"))
-        self._order = band_order(h, a, slacks=qp.slacks) if qp.elastic is None else np.zeros(0, dtype=int)
+        self._order = band_order(h, a, slacks=qp.slacks) if qp.flexibility is None else np.zeros(0, dtype=int)
         self._equalities = np.arange(a.size1() - qp.equations, a.size1())
         self._max_dense = max(MAX_DENSE_ENTRIES // (sum(a.shape) + qp.slacks) ** 2, 1)
         self._start_with(choice.solver(qp))
@@ -139,7 +144,7 @@ class ContactSolver:
         predicted = np.zeros(len(slacks), dtype=np.bool_)
         for rows in self._parts(np.flatnonzero(inputs["guess"].any(axis=1))):
             systems = self._dense_problem(_of(problem, rows))
-            solution = ActiveSet(active[rows], slacks[rows] > 0).answer(systems, self._order)
+            solution = solve_active(systems, active[rows], slacks[rows] > 0, self._order)
             answer = self._finished(_of(inputs, rows) | _of(problem, rows) | solution)
             outputs = outputs or {name: np.empty((len(slacks), values.shape[1])) for name, values in answer.items()}
             _replace(outputs, rows, answer)
@@ -154,26 +159,26 @@ class ContactSolver:
             return outputs
         is_rough = _is_rough(outputs) | (self._kernel is not None)
         for rows in self._parts(np.flatnonzero(is_rough & np.isfinite(outputs["residual"][:, 0]))):
-            polished = self._polish(_of(problem, rows), _of(solution, rows))
-            answer = self._finished(_of(inputs, rows) | _of(problem, rows) | polished)
+            part, rough = _of(problem, rows), _of(solution, rows)
+            if self._kernel is not None:  # it exchanges wrong rows
+                pushes = -rough["lam_a"][:, : part["length"].shape[1]]
+                polished = self._kernel(part, pushes, np.zeros_like(pushes))[0]
+            else:
+                systems = self._dense_problem(part)
+                active = active_set(systems, rough, self._equalities, self._qp.slacks)
+                polished = solve_active(systems, *active, self._order)
+            answer = self._finished(_of(inputs, rows) | part | polished)
             better = answer["residual"][:, 0] < outputs["residual"][rows, 0]
             _replace(outputs, rows[better], _of(answer, better))
         return outputs
 
-    def _polish(self, problem: Arrays, solution: Arrays) -> Arrays:
-        """Return the answers of the active sets of a solver's solutions; the kernel of elastic parts exchanges wrong rows."""
-        if self._kernel is not None:
-            pushes = -solution["lam_a"][:, : problem["length"].shape[1]]
-            return self._kernel(problem, pushes, np.zeros_like(pushes))[0]
-        systems = self._dense_problem(problem)
-        return ActiveSet.of_answer(systems, solution, self._equalities, self._qp.slacks).answer(systems, self._order)
-
     def _finished(self, arrays: Arrays) -> Arrays:
         """Return the outputs of `finish`; elastic parts bend by the reactions, and rows in conflict are `opened`."""
-        elastic, size = self._qp.elastic, self._qp.assemble.size1_out("h")
-        if elastic is not None:
-            bent = elastic.flexibility.bent(elastic.reactions(arrays["lam_a"], arrays["length"]))
-            bent += arrays.get("opened", 0)
+        flexibility, size = self._qp.flexibility, self._qp.assemble.size1_out("h")
+        if flexibility is not None:
+            length = arrays["length"]
+            reactions = -arrays["lam_a"][:, : length.shape[1]] / length * self._qp.scale
+            bent = flexibility.bent(reactions) + arrays.get("opened", 0)
             arrays = arrays | {"bent": bent, "x": arrays["x"][:, :size], "lam_x": arrays["lam_x"][:, :size]}
         outputs = self._finish(**arrays)
         if "opened" in arrays:
@@ -188,17 +193,16 @@ class ContactSolver:
         """Return the rows in parts, so that the dense matrices of a part take little memory."""
         return np.split(rows, range(self._max_dense, len(rows), self._max_dense)) if rows.size else []
 
-    def _dense_problem(self, problem: Arrays) -> dict[str, np.ndarray]:
-        return {name: self._dense(name, problem[name]) for name in ("h", "g", "a", "lba")}
-
-    def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
-        """Return all entries of an output of `assemble`: (realization, row, column), or (realization, row) of a vector."""
-        sparsity = self._qp.sparsity(name)
-        columns = np.zeros((len(stored), sparsity.numel()))
-        columns[:, sparsity.find()] = stored
-        if sparsity.size2() == 1:
-            return columns
-        return columns.reshape(len(stored), sparsity.size2(), sparsity.size1()).swapaxes(1, 2)
+    def _dense_problem(self, problem: Arrays) -> Problem:
+        """Return all entries of h, g, a and lba: (realization, row, column), or (realization, row) of a vector."""
+        dense = {}
+        for name in ("h", "g", "a", "lba"):
+            stored, sparsity = problem[name], self._qp.sparsity(name)
+            columns = np.zeros((len(stored), sparsity.numel()))
+            columns[:, sparsity.find()] = stored
+            shape = len(stored), sparsity.size2(), sparsity.size1()
+            dense[name] = columns if sparsity.size2() == 1 else columns.reshape(shape).swapaxes(1, 2)
+        return dense
 
 
 def _is_rough(answer: Arrays) -> Bool[Array, " realization"]:
@@ -222,3 +226,81 @@ def _replace(arrays: Arrays, rows: np.ndarray, replacements: Arrays) -> None:
     """Overwrite the given rows of all arrays."""
     for name, values in replacements.items():
         arrays[name][rows] = values
+
+
+def active_set(
+    problem: Problem, answer: Arrays, equalities: Int[Array, " k"], slacks: int
+) -> tuple[Bool[Array, "QP row"], Bool[Array, "QP slack"]]:
+    """Return which rows are active and which slacks are positive in a solver's answers: min x'Hx/2 + g'x, a x >= lba.
+
+    The rows `equalities` are equations, and the last variables are slacks, >= 0.
+
+    problem     h (QP, n, n), g (QP, n), a (QP, row, n), lba (QP, row)
+    answer      x (QP, n), lam_a (QP, row), lam_x (QP, n) of a solver; multipliers of active rows are negative
+    """
+    x, lam_a, lam_x = (answer[name] for name in ("x", "lam_a", "lam_x"))
+    # For every solver, either the row or its multiplier is zero up to rounding: the smaller of the two.
+    active = -lam_a > np.einsum("kij,kj->ki", problem["a"], x) - problem["lba"]
+    active[:, equalities] = True
+    return active, (-lam_x <= x)[:, x.shape[1] - slacks :]
+
+
+def solve_active(
+    problem: Problem, active: Bool[Array, "QP row"], is_open: Bool[Array, "QP slack"], order: Int[Array, " unknown"]
+) -> Arrays:
+    """Return x, lam_a and lam_x (QP, entry) of QPs with an active set, each one linear system; NaN without a solution.
+
+    order   order of the unknowns, see solve_conditions
+    """
+    H, g, A, lower = (problem[name] for name in ("h", "g", "a", "lba"))
+    count, rows, size = A.shape
+    slacks = is_open.shape[1]
+    solution = np.empty((count, size + rows + slacks))
+    solve_conditions((H, g, A, lower), active, is_open, order, COMPLIANCE, REFINEMENTS, solution)
+    x, multipliers = solution[:, :size], solution[:, size:]
+    lam_x = np.zeros_like(x)
+    lam_x[:, size - slacks :] = -multipliers[:, rows:]
+    return {"x": x, "lam_a": -multipliers[:, :rows], "lam_x": lam_x}
+
+
+def band_order(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int) -> Int[Array, " unknown"]:
+    """Return the variables of the movers and the rows, mover by mover; each row follows the last of its movers.
+
+    Movers are in Cuthill-McKee order.
+    """
+    size = h.size1() - slacks
+    movers_of_rows: list[set[int]] = [set() for _ in range(a.size1())]
+    for row, column in zip(*a.get_triplet(), strict=True):
+        if column < size:
+            movers_of_rows[row].add(column // FREEDOMS)
+    neighbours: list[set[int]] = [set() for _ in range(size // FREEDOMS)]
+    coupled = ({row // FREEDOMS, column // FREEDOMS} for row, column in zip(*h.get_triplet(), strict=True) if row < size)
+    for movers in (*movers_of_rows, *coupled):
+        for mover in movers:
+            neighbours[mover] |= movers - {mover}
+    rank = {mover: k for k, mover in enumerate(_cuthill_mckee(neighbours))}
+    variables = [(rank[k // FREEDOMS], 0, k) for k in range(size)]
+    rows = [(max((rank[mover] for mover in movers), default=-1), 1, size + k) for k, movers in enumerate(movers_of_rows)]
+    return np.array([unknown for *_, unknown in sorted(variables + rows)], dtype=np.int64)
+
+
+def _cuthill_mckee(neighbours: list[set[int]]) -> list[int]:
+    """Return the nodes of a graph in Cuthill-McKee order.
+
+    Each connected component is ordered level by level, starting from a node of the last level about an arbitrary node.
+    """
+    order: list[int] = []
+    for node in range(len(neighbours)):
+        if node not in order:
+            order += _levels(neighbours, _levels(neighbours, node)[-1])
+    return order
+
+
+def _levels(neighbours: list[set[int]], start: int) -> list[int]:
+    """Return the nodes that are connected to `start`, by distance from it; nodes with fewer neighbours come first."""
+    order, reached = [start], {start}
+    for node in order:
+        level = sorted(neighbours[node] - reached, key=lambda neighbour: (len(neighbours[neighbour]), neighbour))
+        order += level
+        reached.update(level)
+    return order

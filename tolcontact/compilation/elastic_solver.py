@@ -25,17 +25,16 @@ class ElasticSolver:
     remembers = False
 
     def __init__(self, qp: ContactQP) -> None:
-        elastic = qp.elastic
-        assert elastic is not None
-        pairs, count = len(qp.spans), len(elastic.flexibility.holds)
+        assert qp.flexibility is not None
+        pairs, count = len(qp.spans), len(qp.flexibility.holds)
         rows, size = qp.assemble.size_out("a")
         holds = np.ones(rows, dtype=bool)
-        holds[:count] = elastic.flexibility.holds
-        self._movers, self._count, self._elastic = size - pairs, count, elastic
+        holds[:count] = qp.flexibility.holds
+        self._movers, self._count, self._length = size - pairs, count, qp.length
         self._order = np.argsort(holds, kind="stable")
         self._equations = int(holds.sum())
         C = np.zeros((rows, rows))
-        C[:count, :count] = elastic.flexibility.C * elastic.scale
+        C[:count, :count] = qp.flexibility.C * qp.scale
         self._C = np.ascontiguousarray(C[np.ix_(self._order, self._order)])
         position = np.argsort(self._order)
         self._h, self._a = (np.array(qp.assemble.sparsity_out(name).get_triplet()) for name in ("h", "a"))
@@ -61,17 +60,22 @@ class ElasticSolver:
 
         Probably, rows with `reactions` are active.
         """
-        count, length = len(reactions), self._length(problem)
+        count = len(reactions)
+        length = np.ones((count, len(self._order)))  # of the unscaled rows; 1 for exact locators
+        length[:, : self._count] = problem["length"]
         systems = self._systems(problem, length)
         guess = np.zeros((count, len(self._order)))
         guess[:, : self._count] = reactions
         x, forces, status = _solved(systems, self._C, self._equations, guess[:, self._order])
         values, opened = np.zeros((count, problem["g"].shape[1])), np.zeros((count, self._count))
         values[:, : self._movers] = x
-        is_huge = np.abs(forces).max(axis=1, initial=0) > self._elastic.length / SLACK  # more than the price of slacks
+        is_huge = np.abs(forces).max(axis=1, initial=0) > self._length / SLACK  # more than the price of slacks
         for k in np.flatnonzero((status == INFEASIBLE) | is_huge):
             system = tuple(array[k] for array in systems)
-            if status[k] == SOLVED and self._misfit(system, x[k], forces[k]) < ACCURACY:
+            _, _, A, b = system
+            gaps, first = A @ x[k] + self._C @ forces[k] + b, len(b) - self._equations
+            gaps[:first] = np.where(forces[k][:first] > 0, gaps[:first], np.minimum(gaps[:first], 0))
+            if status[k] == SOLVED and np.abs(gaps).max(initial=0) < ACCURACY:  # rows under load closed, others not inside
                 continue
             increments, slacks_there, reactions_there, outcome = self._nearest(system)
             if self._is_ray(system, forces[k], reactions_there):
@@ -85,12 +89,6 @@ class ElasticSolver:
         lam_a *= length
         answer = {"x": values, "lam_a": lam_a, "lam_x": self._lam_x(problem, values, lam_a), "opened": opened}
         return answer, status != SOLVED
-
-    def _length(self, problem: Arrays) -> np.ndarray:
-        """Return the lengths (realization, row) of the unscaled rows, 1 for exact locators."""
-        length = np.ones((len(problem["length"]), len(self._order)))
-        length[:, : self._count] = problem["length"]
-        return length
 
     def _systems(self, problem: Arrays, length: np.ndarray) -> Systems:
         """Return H, g, A and b of solve_dual, with gaps in mm."""
@@ -115,20 +113,13 @@ class ElasticSolver:
                 lam_x[:, column] -= problem["a"][:, entry] * lam_a[:, row]
         return lam_x
 
-    def _misfit(self, system: tuple[np.ndarray, ...], x: Float[Array, " n"], forces: Float[Array, " row"]) -> float:
-        """Return how far [mm] rows under load are from closed, and others inside."""
-        _, _, A, b = system
-        gaps, first = A @ x + self._C @ forces + b, len(b) - self._equations
-        gaps[:first] = np.where(forces[:first] > 0, gaps[:first], np.minimum(gaps[:first], 0))
-        return float(np.abs(gaps).max(initial=0))
-
     def _is_ray(self, system: tuple[np.ndarray, ...], ray: Float[Array, " row"], limits: Float[Array, " row"]) -> bool:
         """Return whether a ray proves that nothing opens all rows: no increments up to the length, no reactions up to `limits`.
 
         The work of the ray on the gaps A x + C l + b would not be negative if they were open.
         """
         _, _, A, b = system
-        rounding = np.abs(A.T @ ray).sum() * self._elastic.length + np.abs(self._C @ ray) @ np.abs(limits)
+        rounding = np.abs(A.T @ ray).sum() * self._length + np.abs(self._C @ ray) @ np.abs(limits)
         return bool(b @ ray + rounding < -ACCURACY * np.abs(ray).sum())
 
     def _nearest(self, system: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
@@ -142,7 +133,7 @@ class ElasticSolver:
         wide_A[first : first + slacks, size:] = np.eye(slacks)
         wide_b = np.zeros(rows + slacks)
         wide_b[at] = b
-        wide = wide_H, np.concatenate([g, np.full(slacks, self._elastic.length)]), wide_A, wide_b
+        wide = wide_H, np.concatenate([g, np.full(slacks, self._length)]), wide_A, wide_b
         x, forces, status = _solved(tuple(array[None] for array in wide), wide_C, self._equations, np.zeros((1, len(wide_b))))
         increments, opening, reactions = x[0, :size], np.maximum(x[0, size:], 0), forces[0, at]
         # Large reactions leave rounding in the increments: they close the rows under load again.

@@ -6,15 +6,14 @@ blocks is compiled as fast as a tower of six. Up to rounding, the results are eq
 quadratic_terms for the whole group (tests/units/compilation/test_pair_terms.py).
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import casadi as ca
 import numpy as np
 
-from tolcontact.compilation.calls import Call
-from tolcontact.compilation.contact_rows import Rows, contact_rows, relative_poses
-from tolcontact.compilation.quadratic_terms import QuadraticTerms, quadratic_terms
+from tolcontact.compilation.qp_terms import Call, QuadraticTerms, Rows, contact_rows, quadratic_terms, relative_poses
 from tolcontact.mechanics.correction import FREEDOMS, Motion, linear
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap import RowPoints
@@ -60,13 +59,13 @@ def summed_terms(
         pair, count = _Pair.of(system, index), points.compliance.numel()
         z, inputs = pair.increments, pair.inputs(points, poses)
         of_rows = {"reactions": reactions[len(pairs) : len(pairs) + count], "load": load, "scale": scale}
-        *values, slopes, gaps, filled = pair.call(call, "pair_terms", inputs | of_rows, projects=projects)
+        *values, slopes, gaps, filled = pair.call(call, "pair_terms", partial(pair.terms, projects=projects), inputs | of_rows)
         for name, value in zip(TERMS, values, strict=True):
             sums[name][(z, z) if value.size2() > 1 else z] += value
         rows["slopes"].append(ca.SX(count, size))
         rows["slopes"][-1][:, z] = slopes
         at_ends = {name: inputs[name] for name in ("poses", "constants", "faces")} | {"z": system.z[z]}
-        (relative,) = pair.call(call, "linearized", at_ends)
+        (relative,) = pair.call(call, "linearized", pair.linearized, at_ends)
         for name, column in zip(COLUMNS, (gaps, filled, points.compliance, relative), strict=True):
             rows[name].append(column)
         pairs += [index] * count
@@ -149,23 +148,22 @@ class _Pair:
             "bend": ca.SX(0, 1) if points.bend is None else points.bend,
         }
 
-    def call(self, call: Call, name: str, inputs: Inputs, *, projects: bool = False) -> Sequence[ca.SX]:
-        """Return the results of its equations: TERMS, slopes, gaps and filled, or of "linearized" the relative pose."""
+    def call(self, call: Call, name: str, expression: Callable[[Inputs], Sequence[ca.SX]], inputs: Inputs) -> Sequence[ca.SX]:
+        """Return the results of an expression of inputs by name."""
 
         def results(*symbols: ca.SX) -> Sequence[ca.SX]:
-            by_name = dict(zip(inputs, symbols, strict=True))
-            return [self._linearized(by_name)] if name == "linearized" else self._terms(by_name, projects=projects)
+            return expression(dict(zip(inputs, symbols, strict=True)))
 
         return call(name, results, *inputs.values(), kind=self.kind)
 
-    def _linearized(self, inputs: Inputs) -> ca.SX:
+    def linearized(self, inputs: Inputs) -> list[ca.SX]:
         """Return X_RM (12, 1) to first order in the increments."""
         equations, motion = self._equations(inputs)
         ((start, by_z),) = relative_poses(equations, motion.poses, motion.by(linear))
-        return start.vector() + by_z @ equations.z
+        return [start.vector() + by_z @ equations.z]
 
-    def _terms(self, inputs: Inputs, *, projects: bool) -> list[ca.SX]:
-        """Return the terms of its sides and the rows of its points."""
+    def terms(self, inputs: Inputs, *, projects: bool) -> list[ca.SX]:
+        """Return the terms of its sides, and slopes, gaps and filled of the rows of its points."""
         equations, motion = self._equations(inputs)
         has_slots = inputs["bend"].numel() > 0
         columns = [ca.horzsplit(inputs[name]) if inputs[name].numel() else [] for name in POINTS]

@@ -3,30 +3,30 @@
 import logging
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from tolcontact.arrays import Array, Float
-from tolcontact.compilation.bounded_pairs import TRIAL_SEED, Trial, allowed_depths, bounded_pairs
-from tolcontact.compilation.contact_qp import ContactQP, contact_qp, row_count
-from tolcontact.compilation.contact_rows import MANY_SLOTS, SLOTS, standing_points
+from tolcontact.compilation.contact_qp import ContactQP, Standing, contact_qp, row_count
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
-from tolcontact.compilation.measure_accuracy import measure_accuracies
 from tolcontact.compilation.method_checks import check_forces, check_method
+from tolcontact.compilation.qp_terms import standing_points
 from tolcontact.compilation.solver import SolverChoice
 from tolcontact.compilation.solvers import solver_choice
 from tolcontact.compilation.station_program import StationProgram, station_programs
+from tolcontact.compilation.trials import TRIAL_SEED, Trial, allowed_depths, bounded_pairs, measure_accuracies
 from tolcontact.declaration.measure import Tape
-from tolcontact.discretization import ContactPoints, Nominal, coordinates_in_words
+from tolcontact.discretization import Nominal, coordinates_in_words
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.interference import Watch
 from tolcontact.limits import Limits
 from tolcontact.mechanics.flexibility import (
     Bending,
+    PartFlexibility,
     elastic_bodies,
     group_flexibility,
     part_flexibilities,
@@ -46,6 +46,8 @@ from tolcontact.variation import Draws
 
 log = logging.getLogger(__name__)
 WATCH_DRAWS = 64  # that bound the motion of bodies
+STIFFER = 1e9  # times the stiffness: rigid in any figure
+SAME = 1e-9  # relative: equations that are equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,15 +179,11 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         watch = _watch(nominal, draws, place)
         meetings, trials = bounded_pairs(watch, groups, draws, place, observe, method)
         gaps = [pair_gaps(pair).compiled(nominal.input_count) for pair in nominal.pairs]
-        rows = [_rows(pair, gaps[k], trials[k] if k in meetings else None, method) for k, pair in enumerate(nominal.pairs)]
+        standing = [standing_points(pair, gaps[k], method, is_searched=k in meetings) for k, pair in enumerate(nominal.pairs)]
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
-        standing = [[rows[k] for k in group.pairs] for group in groups]
         elastic = part_flexibilities(nominal, bodies)
         bending = Bending(nominal, elastic) if elastic else None
-        qps = []
-        for group, points in zip(groups, standing, strict=True):
-            flexibility = group_flexibility(nominal, group, list(map(row_count, points)), elastic)
-            qps.append((group, contact_qp(nominal, group, method, points, flexibility=flexibility)))
+        nowhere, undeviated = np.tile(AT_REST, (1, len(nominal.parts))), np.zeros((1, len(nominal.contributors)))
         return Program(
             nominal=nominal,
             draws=draws,
@@ -196,12 +194,14 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             gaps=tuple(NamedFunction.dense(of_pair) if isinstance(of_pair, ca.Function) else of_pair for of_pair in gaps),
             meetings=meetings,
             trials=trials,
-            groups=tuple(ContactGroup(group, qp, ContactSolver(qp, choice)) for group, qp in qps),
+            groups=tuple(
+                _contact_group(nominal, group, method, [standing[k] for k in group.pairs], elastic, choice) for group in groups
+            ),
             bending=bending,
-            observe_bent=bent_measures(nominal, entries, d, bending) if bending else None,
+            observe_bent=_bent_measures(nominal, bending) if bending else None,
             accuracies=measure_accuracies(nominal, groups, draws, place, observe),
             watch=watch.allowing(allowed_depths(nominal, meetings, trials)),
-            nominal_measures=_nominal_measures(nominal, observe),
+            nominal_measures=observe(poses=nowhere, deviations=undeviated)["measured"][0],
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
                 for measure, value in zip(nominal.measures, values, strict=True)
@@ -227,16 +227,12 @@ def _observe(nominal: Nominal, entries: ca.SX, deviations: ca.SX, values: Sequen
     )
 
 
-def bent_measures(nominal: Nominal, entries: ca.SX, deviations: ca.SX, bending: Bending) -> NamedFunction:
+def _bent_measures(nominal: Nominal, bending: Bending) -> NamedFunction:
     """Return the function of the measures of bent parts, see Program."""
+    entries, deviations = ca.SX.sym("poses", ENTRIES * len(nominal.parts)), ca.SX.sym("deviations", len(nominal.contributors))
     values = ca.vertcat(*measured(nominal, poses_of(entries), deviations, bending))
     inputs = {"poses": entries, "deviations": deviations, "loads": bending.loads}
     return NamedFunction.dense(ca.Function("observe_bent", [*inputs.values()], [values], [*inputs], ["measured"]))
-
-
-def _nominal_measures(nominal: Nominal, observe: NamedFunction) -> np.ndarray:
-    poses, deviations = np.tile(AT_REST, (1, len(nominal.parts))), np.zeros((1, len(nominal.contributors)))
-    return observe(poses=poses, deviations=deviations)["measured"][0]
 
 
 def _watch(nominal: Nominal, draws: Draws, place: NamedFunction) -> Watch:
@@ -245,11 +241,49 @@ def _watch(nominal: Nominal, draws: Draws, place: NamedFunction) -> Watch:
     return Watch(nominal, {}, poses, deviations)
 
 
-def _rows(pair: ContactPoints, gaps: Any, trial: Trial | None, method: Method) -> np.ndarray | int:
-    """Return the points of a pair that always have a row, or the number of its slots; with the trial of a pair with a meeting.
+def _contact_group(
+    nominal: Nominal, group: Group, method: Method, standing: Standing, parts: Sequence[PartFlexibility], solver: SolverChoice
+) -> ContactGroup:
+    """Compile a group, with the flexibility of its elastic parts."""
+    flexibility = group_flexibility(nominal, group, list(map(row_count, standing)), parts)
+    qp = contact_qp(nominal, group, method, standing, flexibility=flexibility)
+    return ContactGroup(group, qp, ContactSolver(qp, solver))
 
-    The contact points of a pair with a meeting change with every pose, so that none of them always has a row.
-    """
-    if trial is None:
-        return standing_points(pair, gaps, method)
-    return MANY_SLOTS if pair.has_form else SLOTS
+
+def with_flexibility(program: Program, parts: Sequence[PartFlexibility]) -> Program:
+    """Return the program with another flexibility of its elastic parts; contact points and constant forces stay."""
+    nominal, bending = program.nominal, Bending(program.nominal, parts)
+    groups = tuple(
+        _contact_group(nominal, compiled.group, program.method, compiled.qp.standing, parts, program.solver)
+        for compiled in program.groups
+    )
+    return replace(program, groups=groups, bending=bending, observe_bent=_bent_measures(nominal, bending))
+
+
+def stiffer(program: Program, factor: float) -> Program:
+    """Return the program with elastic parts of `factor` times the stiffness."""
+    parts = program.bending.parts.values() if program.bending else ()
+    scaled = ("C", "opening", "moved", "surface")
+    return with_flexibility(
+        program, [part._replace(**{name: getattr(part, name) / factor for name in scaled}) for part in parts]
+    )
+
+
+def overheld(program: Program) -> str:
+    """Return the names of pairs that hold parts by more equations than these have freedoms; empty if none do."""
+    for group in program.groups:
+        rows, names = [], dict[str, None]()
+        for pair in (program.nominal.pairs[k] for k in group.group.pairs):
+            if not (pair.holds and pair.elastic):
+                continue
+            names[pair.name] = None
+            for P_m, n in zip(pair.P_m, pair.n_r, strict=True):
+                row = np.zeros((len(program.nominal.parts), 6))
+                row[pair.moving] = [*n, *np.cross(P_m, n) / group.group.length]
+                if pair.reference is not None:
+                    row[pair.reference] = -row[pair.moving]
+                rows.append(row.ravel())
+        if rows and np.linalg.matrix_rank(rows, tol=SAME * len(rows)) < len(rows):
+            first, *others = names
+            return f'"{first}"' + (f" and {len(others)} more" if others else "")
+    return ""

@@ -10,7 +10,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import Program
-from tolcontact.compilation.other_flexibility import STIFFER, overheld, stiffer, with_flexibility
+from tolcontact.compilation.program import STIFFER, overheld, stiffer, with_flexibility
 from tolcontact.elasticity import ElasticBody
 from tolcontact.errors import GeometryFault, NominalWarning
 from tolcontact.mechanics.flexibility import Bodies, PartFlexibility, elastic_bodies, part_flexibilities

@@ -8,7 +8,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
-from tolcontact.compilation.bounded_pairs import TRIAL_SEED, push
+from tolcontact.compilation.trials import TRIAL_SEED, push
 from tolcontact.contact import pair_search
 from tolcontact.interference import Clash
 from tolcontact.simulation import Block, simulate_block

@@ -14,8 +14,7 @@ from tolcontact.contact.record import Record, join_groups, untouched_numbers
 from tolcontact.contact.state import Outcome
 from tolcontact.mechanics import ENTRIES
 from tolcontact.readable import Readable
-from tolcontact.simulation.bodies import watched_bodies
-from tolcontact.simulation.locator_offsets import locator_offsets
+from tolcontact.simulation.bodies import locator_offsets, watched_bodies
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 
@@ -79,36 +78,32 @@ class Block(Record, Readable):
     @classmethod
     def untouched(
         cls,
+        program: Program,
         start: int,
         deviations: Float[Array, "n contributor"],
         raw: Float[Array, "n part 12"],
         measured: Float[Array, "n measure"],
-        pairs: int,
-        stations: int,
-        loads: int,
-        welds: int,
     ) -> "Block":
         """Return realizations at their raw poses (n, part, 12), with measures (n, measure), that contact does not change."""
-        count, states = len(raw), len(terms.STATES)
+        nominal, count, states, status = program.nominal, len(raw), len(terms.STATES), terms.Status.UNTOUCHED
+        pairs = count, len(nominal.pairs)
         return cls(
             **untouched_numbers(count),
             start=start,
             deviations=deviations,
             poses=np.stack([raw] * states, axis=1),
             measured=np.stack([measured] * states, axis=1),
-            gap_min=np.empty((count, states, pairs)),
-            active=np.zeros((count, pairs), dtype=int),
-            carrying=np.zeros((count, pairs), dtype=int),
-            reaction=np.zeros((count, pairs)),
-            load=np.zeros((count, loads)),
-            weld_gap=np.zeros((count, welds)),
-            clashes=np.full(count, -1),
+            gap_min=np.empty((count, states, len(nominal.pairs))),
+            active=np.zeros(pairs, dtype=int),
+            carrying=np.zeros(pairs, dtype=int),
+            reaction=np.zeros(pairs),
+            load=np.zeros((count, len(nominal.loads))),
+            weld_gap=np.zeros((count, nominal.input_count - deviations.shape[1])),
             clash_depth=np.zeros(count),
-            clash_part=np.full(count, -1),
-            clash_other=np.full(count, -1),
-            locator_offset=np.zeros((count, raw.shape[1])),
-            status=np.full(count, terms.Status.UNTOUCHED, dtype=np.int8),
-            station_status=np.full((count, stations), terms.Status.UNTOUCHED, dtype=np.int8),
+            **{name: np.full(count, -1) for name in ("clashes", "clash_part", "clash_other")},
+            locator_offset=np.zeros(raw.shape[:2]),
+            status=np.full(count, status, dtype=np.int8),
+            station_status=np.full((count, len(program.stations)), status, dtype=np.int8),
         )
 
     @classmethod
@@ -137,9 +132,7 @@ def simulate_block(
     placed = program.place(deviations=deviations)["poses"]
     raw = placed.reshape(len(deviations), len(program.nominal.parts), ENTRIES)
     measured, relative = program.observed(raw, deviations)
-    nominal, stations = program.nominal, len(program.stations)
-    counts = {"pairs": len(nominal.pairs), "loads": len(nominal.loads), "welds": nominal.input_count - deviations.shape[1]}
-    block = Block.untouched(start, deviations, raw, measured, stations=stations, **counts)
+    nominal, block = program.nominal, Block.untouched(program, start, deviations, raw, measured)
     stages = program.stations or (None,)
     outcomes_by_stage = np.zeros((len(block), len(stages)), dtype=np.int8)
     # NaN gaps count as no contact, so realizations with NaN poses are marked as unsolved below.
@@ -157,7 +150,10 @@ def simulate_block(
             resolved = resolver.resolve(raw, relative, inputs)
             _put(block, resolver, resolved)
             if is_placed_again:
-                _put_raw(block, resolver, changed, raw_relative, raw_inputs)
+                # Contact was resolved from handed-over poses. Welds keep no gaps before contact.
+                gaps, active = resolver.raw_contact(raw_relative[changed], raw_inputs[changed])
+                block.gap_min[changed[:, None], RAW, resolver.pairs] = gaps
+                block.active[changed[:, None], resolver.pairs] = active
             worst[resolved.touched] = np.maximum(worst[resolved.touched], resolved.state.outcome)
         for weld in nominal.welds:
             if program.bending is not None and station is not None and weld.station == station.name:
@@ -175,7 +171,10 @@ def simulate_block(
         bent = program.observe_bent(poses=poses, deviations=deviations[touched], loads=block.load[touched])
         block.measured[touched, CORRECTED] = bent["measured"]
     block.locator_offset[touched] = locator_offsets(program.nominal, block.poses[touched])
-    statuses = _statuses(program.method.is_exact)
+    # Only repeated steps can show that no pose is free of penetration.
+    conflict = Status.NOT_ASSEMBLABLE if program.method.is_exact else Status.NOT_CONVERGED
+    by_outcome = [Status.UNTOUCHED, Status.RESOLVED, conflict, Status.DOUBTFUL, Status.NOT_CONVERGED]
+    statuses = np.array(by_outcome, dtype=np.int8)
     block.status[:], block.station_status[:] = statuses[worst], statuses[outcomes_by_stage[:, : len(program.stations)]]
     return block
 
@@ -183,7 +182,7 @@ def simulate_block(
 def _watch(program: Program, block: Block, resolvers: list[ContactResolver], outcomes_by_stage: Int[Array, "n stage"]) -> None:
     """Write the bodies that interfere into a block, and withdraw the certificates that they refute."""
     worst = outcomes_by_stage.max(axis=1)
-    bodies = watched_bodies(
+    clashes, withdrawn = watched_bodies(
         program,
         block.poses[:, CORRECTED],
         block.deviations,
@@ -192,9 +191,9 @@ def _watch(program: Program, block: Block, resolvers: list[ContactResolver], out
         is_doubtful=worst == Outcome.DOUBTFUL,
         is_certified=worst <= Outcome.RESOLVED,
     )
-    block.clashes[:], block.clash_depth[:] = bodies.clashes, bodies.depth
-    block.clash_part[:], block.clash_other[:] = bodies.part, bodies.other
-    for index, rows in bodies.withdrawn:
+    for name, values in clashes.items():
+        getattr(block, name)[:] = values
+    for index, rows in withdrawn:
         of_stage = outcomes_by_stage[:, index]
         of_stage[rows] = np.where(of_stage[rows] <= Outcome.RESOLVED, Outcome.DOUBTFUL, of_stage[rows])
 
@@ -232,25 +231,3 @@ def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
     join_groups(block, touched, state)
     if resolver.flexibility is not None:
         block.load[touched[:, None], resolver.flexibility.loads] = state.multipliers[:, resolver.flexibility.load_rows]
-
-
-def _put_raw(
-    block: Block,
-    resolver: ContactResolver,
-    rows: np.ndarray,
-    relative: Float[Array, "n pair 12"],
-    inputs: Float[Array, "n input"],
-) -> None:
-    """Write gaps and active points of the raw state for rows whose contact was resolved from handed-over poses.
-
-    inputs   deviations, and 0 for the gaps of welds, which keep none before contact
-    """
-    gaps, active = resolver.raw_contact(relative[rows], inputs[rows])
-    block.gap_min[rows[:, None], RAW, resolver.pairs] = gaps
-    block.active[rows[:, None], resolver.pairs] = active
-
-
-def _statuses(is_exact: bool) -> np.ndarray:
-    """Return the Status for each Outcome. Only repeated steps can show that no pose is free of penetration."""
-    conflict = Status.NOT_ASSEMBLABLE if is_exact else Status.NOT_CONVERGED
-    return np.array([Status.UNTOUCHED, Status.RESOLVED, conflict, Status.DOUBTFUL, Status.NOT_CONVERGED], dtype=np.int8)

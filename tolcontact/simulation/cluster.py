@@ -24,6 +24,7 @@ from tolcontact.simulation.packing import (
     MISSING_VERSION,
     Packed,
     check_version,
+    needs_dask,
     pack_model,
     prepare_worker,
     simulate_shard,
@@ -139,15 +140,6 @@ def running_cluster(address: str) -> Iterator[Any]:
         logger.setLevel(level)
 
 
-@contextmanager
-def needs_dask() -> Iterator[None]:
-    """Raise OptionError if dask is not installed."""
-    try:
-        yield
-    except ImportError as error:
-        raise OptionError("workers and lazy datasets need dask; install it with: pip install 'tolcontact[dask]'") from error
-
-
 def mapping(client: Any) -> MapBlocks:
     """Return `map_blocks`, or the same on the workers of a client. Raises ClusterError if they cannot be used."""
     return Threads() if client is None else Workers(client)
@@ -168,8 +160,18 @@ class Workers:
     """
 
     def __init__(self, client: Any, timeout: float = WORKER_TIMEOUT) -> None:
-        check_workers(client, timeout=timeout)
         self._client, self._timeout = client, timeout
+        try:
+            client.wait_for_workers(1, timeout=timeout)
+        except TimeoutError as error:
+            raise ClusterError(
+                f"no worker came within {timeout:.0f} s; start some with: dask worker {client.scheduler.address} --nthreads 1"
+            ) from error
+        except OSError as error:
+            raise ClusterError(f"the scheduler was lost before it had work: {error}; resume the run later") from error
+        for library, expected in versions().items():
+            for worker, actual in client.run(version, library, on_error="return").items():
+                check_version(worker, library, actual if isinstance(actual, str) else MISSING_VERSION, expected)
         self._sent: list[Any] = []
 
     def __call__(
@@ -197,21 +199,6 @@ class Workers:
     def get_ready(self, function: Callable[[Block], Any], program: Program) -> None:
         """Make all present workers import and compile the program; otherwise their first shard takes longer."""
         self._client.run(prepare_worker, pack_model(program), Packed.of(function, program.nominal).data)
-
-
-def check_workers(client: Any, timeout: float = WORKER_TIMEOUT) -> None:
-    """Raise ClusterError unless a worker connects within `timeout` [s], and all have the versions of this process."""
-    try:
-        client.wait_for_workers(1, timeout=timeout)
-    except TimeoutError as error:
-        raise ClusterError(
-            f"no worker came within {timeout:.0f} s; start some with: dask worker {client.scheduler.address} --nthreads 1"
-        ) from error
-    except OSError as error:
-        raise ClusterError(f"the scheduler was lost before it had work: {error}; resume the run later") from error
-    for library, expected in versions().items():
-        for worker, actual in client.run(version, library, on_error="return").items():
-            check_version(worker, library, actual if isinstance(actual, str) else MISSING_VERSION, expected)
 
 
 def shard_result(client: Any, future: Any, timeout: float = WORKER_TIMEOUT) -> Any:
@@ -289,7 +276,10 @@ class _Shards:
         """Wait for a scheduler that has lost the shards in progress, and submit them again."""
         log.warning("the scheduler was lost; waiting for it")
         deadline = time.monotonic() + self._timeout
-        while not self._has_workers():
+        while True:
+            with suppress(OSError):  # the connection may be lost between reading the status and the request
+                if self._client.status == "running" and self._client.nthreads():
+                    break
             if time.monotonic() > deadline:
                 raise ClusterError(
                     "the scheduler was lost, and did not come back with its workers "
@@ -301,9 +291,3 @@ class _Shards:
         self._pending.clear()
         for start, stop, _ in lost:
             self.begin(start, stop)
-
-    def _has_workers(self) -> bool:
-        """Whether the scheduler answers, and has workers."""
-        with suppress(OSError):  # the connection may be lost between reading the status and the request
-            return self._client.status == "running" and bool(self._client.nthreads())
-        return False

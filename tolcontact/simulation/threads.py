@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -27,14 +27,8 @@ PIECE_ROWS = 512  # at most; a thread needs several milliseconds to start
 MAX_BODIES = 24  # coupled bodies: a whole block of more bodies would take longer than about ten seconds
 
 T = TypeVar("T")
+Sampler = Callable[..., np.ndarray]  # (seed=, start=, stop=) -> deviations (realization, contributor), such as Draws
 Resolvers = list[ContactResolver]  # one for each group of a program; they serve one block at a time
-
-
-@runtime_checkable
-class Sampler(Protocol):
-    """A source of deviations (realization, contributor) of realizations `start` to `stop`, such as Draws."""
-
-    def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray: ...
 
 
 class ProgramFunction(ABC):

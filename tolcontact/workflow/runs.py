@@ -1,4 +1,7 @@
-"""Runs: from a declared assembly to an archive, up to a stopping rule, and its results."""
+"""Runs: from a declared assembly to an archive, up to a stopping rule, and its results.
+
+Sums over the realizations give the displacement fields, and count touching contact points.
+"""
 
 import logging
 import math
@@ -11,31 +14,36 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_archive, open_unchecked
+from tolcontact import vocabulary as terms
+from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_archive, open_unchecked, row_values
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
+from tolcontact.contact import pair_search
 from tolcontact.errors import OptionError, check_choice
 from tolcontact.method import Solver
 from tolcontact.replacing import check_identities
-from tolcontact.simulation import block_rows, other_objectives
+from tolcontact.simulation import Block, ProgramFunction, block_rows
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
-from tolcontact.simulation.surfaces import check_surfaces, simulated_poses, warn_of
-from tolcontact.statistics import STATISTICS, estimate_of
+from tolcontact.simulation.run_checks import COMPARED_ROWS, MIN_COMPARED, by_objective, check_surfaces, simulated_poses, warn_of
+from tolcontact.statistics import STATISTICS, BlockSums, DisplacementFields, TouchingShares, estimate_of
 from tolcontact.statistics.measure_statistics import HALF_WIDTH, StatisticRequest
 from tolcontact.temporary import temporary_folder
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, OBJECTIVES_GROUP, OUTSIDE, PLANS, PPM, FieldChoice, Kept, Plan
 from tolcontact.workflow.accessor import Results
-from tolcontact.workflow.forecast import announce
-from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
-from tolcontact.workflow.run_sums import BlockTotals, RunSums
+from tolcontact.workflow.models import Choice, Model, announce, check_counts, check_program, program_of
 
 MIN_GROWTH, MAX_GROWTH = 1.25, 16.0
 MARGIN = 1.05  # times the estimated number of realizations that the interval needs
 MAX_REALIZATIONS = 100_000_000
+MAX_COUNTED = 2048  # realizations whose touching points are counted
+MAX_GAPS = 20_000_000  # of all points in all these realizations
 MAX_WITHOUT_INTERVAL = 10_000  # realizations: an estimate without an interval at this number will not get one
 EXAMPLES = ("corner height: 6 sigma +-1 %", "gap: mean +-0.001")
 __all__ = ["SURFACES", "RunProgress", "open_archive", "run", "write_archive", "write_run"]
 
 SURFACES = 64
+TouchingCounts = tuple[Int[Array, " point"], int]  # contacts at each contact point, and the number of realizations
+BlockTotals = tuple[BlockSums, TouchingCounts]
 RunProgress = Callable[[int], None]  # called with the number of finished realizations
 
 log = logging.getLogger(__name__)
@@ -62,10 +70,6 @@ class Target:
         half = request.value / 100 if request.is_percent else request.value * (1e-6 if is_ppm else 1.0)
         return cls(request, request.measure, OUTSIDE if is_ppm else request.statistic, half, request.is_percent)
 
-    def check(self, program: Program) -> None:
-        """Raise OptionError if the model has no such measure."""
-        self.request.number_of([measure.name for measure in program.nominal.measures])
-
     def next(self, path: Path, program: Program) -> int | None:
         """Return the number of realizations that the archive should have next.
 
@@ -77,7 +81,10 @@ class Target:
         is_hopeless = math.isnan(half) and samples >= MAX_WITHOUT_INTERVAL
         if math.isnan(estimate) or half <= target_half or is_hopeless:
             return None
-        growth = self._growth(half, target_half)
+        growth = MAX_GROWTH
+        if target_half > 0 and math.isfinite(half):
+            ratio = half / target_half
+            growth = MARGIN * ratio * ratio  # infinite for a tiny target, where a power would raise an error
         if not samples * growth <= MAX_REALIZATIONS:
             return None
         rows = block_rows(program)
@@ -100,12 +107,80 @@ class Target:
         estimate, lower, upper = estimate_of(results, self.measure, self.statistic)
         return estimate, (upper - lower) / 2, self.half * (abs(estimate) if self.is_relative else 1.0)
 
-    @staticmethod
-    def _growth(half: float, target_half: float) -> float:
-        if not (target_half > 0 and math.isfinite(half)):
-            return MAX_GROWTH
-        ratio = half / target_half
-        return MARGIN * ratio * ratio  # infinite for a tiny target, where a power would raise an error
+
+def _count_touching(
+    program: Program, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]
+) -> TouchingCounts:
+    """Return the counts at corrected poses (realization, part, 12), for deviations (realization, contributor)."""
+    counts = [np.zeros(len(pair.P_m), dtype=np.int64) for pair in program.nominal.pairs]
+    if len(poses) and counts:
+        _, relative = program.observed(poses, deviations)
+        for k, pair in enumerate(program.nominal.pairs):
+            if not pair.elastic:
+                X_RM = np.ascontiguousarray(relative[:, k])
+                counts[k] = pair_search(program, k).touching_counts(X_RM, deviations, terms.TOUCHING_GAP)
+    return np.concatenate([np.zeros(0, dtype=np.int64), *counts]), len(poses)
+
+
+@dataclass(frozen=True, eq=False)
+class _BlockReduction(ProgramFunction):
+    """Reduction of a block, where it is simulated, to stored rows and sums.
+
+    kept      labels of the stored variables
+    counted   number of realizations, starting with the first, for counting touching points
+    """
+
+    kept: tuple[str, ...]
+    fields: DisplacementFields
+    counted: int
+
+    def __call__(self, program: Program, block: Block) -> tuple[dict[str, np.ndarray], BlockTotals]:
+        # Reprojected contact points differ from the points of the model.
+        rows = np.flatnonzero(block.searched[: max(self.counted - block.start, 0)] == 0)
+        counts = _count_touching(program, block.poses[rows, terms.CORRECTED], block.deviations[rows])
+        fields = self.fields.sums(block.poses, block.start, block.status, block.load)
+        return row_values(block, self.kept, program.nominal), (fields, counts)
+
+
+class RunSums:
+    """The sums of one run.
+
+    fields   the displacement fields of all parts; their sums are stored in checkpoints
+    """
+
+    def __init__(self, program: Program, run: Run) -> None:
+        self._program, self._seed, bending = program, run.seed, program.bending
+        self.fields = DisplacementFields(program.nominal, str(run.fields), bending.parts if bending else None)
+
+    def start_from(self, writer: ArchiveWriter) -> None:
+        """Start from the last checkpoint of an archive, if it has one."""
+        program, pairs, kept = self._program, self._program.nominal.pairs, {row.variable for row in writer.kept}
+        # Touching points are counted only if a reader of the archive could recompute the gaps.
+        need_deviations = any(pair.is_supports or any(face is not None for face in pair.deviating) for pair in pairs)
+        is_known = terms.ROTATION in kept and (terms.DEVIATION in kept or not need_deviations)
+        points = max(sum(len(pair.P_m) for pair in pairs), 1)
+        counted = min(MAX_COUNTED, -(-MAX_GAPS // points)) if is_known else 0
+        self.of_blocks = _BlockReduction(tuple(row.label for row in writer.kept), self.fields, counted)
+        self.fields.resume_from(writer.sums)
+        # Pairs of elastic parts touch where they are bent.
+        is_rigid = [np.full(len(pair.P_m), not pair.elastic) for pair in pairs]
+        self._touching = TouchingShares(np.concatenate([np.zeros(0, dtype=bool), *is_rigid]))
+        if end := min(writer.rows, counted):
+            rows, poses = writer.first_poses(end)
+            self._touching.add(*_count_touching(program, poses, program.draws.rows(rows, seed=self._seed)))
+
+    def merge(self, sums: BlockTotals) -> None:
+        """Add the sums of the next block."""
+        fields, counts = sums
+        self.fields.merge(fields)
+        self._touching.add(*counts)
+
+    @property
+    def groups(self) -> dict[str, dict[terms.ArchiveVariable, Any]]:
+        """The fields and shares over the realizations so far, as groups of an archive."""
+        parts = [terms.field_of(part.name) for part in self._program.nominal.last_parts]
+        touching = dict(zip(terms.TOUCHING, self._touching.values(), strict=True))
+        return dict(zip(parts, self.fields.fields(), strict=True)) | {"contact": touching}
 
 
 # The import registers the methods of results, for anyone who runs a model or opens an archive.
@@ -157,21 +232,13 @@ def run(
     `results = tc.run("model.py", samples=10_000, seed=1, solver="daqp", out="model.nc")`
     """
     settings = Run(seed, samples, keep, surfaces, fields, plan)
-    options = {"solver": solver, "method": method, "until": until, "client": client, "progress": progress}
-    if out is None:
-        return _results_in_memory(model, settings, options, overwrite=overwrite, resume=resume)
-    return open_unchecked(write_run(model, settings, Path(out), overwrite=overwrite, resume=resume, **options))
-
-
-def _results_in_memory(model: Model | Program, settings: Run, options: dict[str, Any], **archive_options: bool) -> xr.DataTree:
-    """Return the results of a run without keeping its archive. Raises OptionError for options that need an archive."""
-    for option, is_set in archive_options.items():
+    options: dict[str, Any] = {"solver": solver, "method": method, "until": until, "client": client, "progress": progress}
+    if out is not None:
+        return open_unchecked(write_run(model, settings, Path(out), overwrite=overwrite, resume=resume, **options))
+    for option, is_set in {"overwrite": overwrite, "resume": resume}.items():
         if is_set:
             raise OptionError(f"{option} needs an archive, and none is named; name one: out=...")
-    with (
-        temporary_folder() as folder,
-        open_unchecked(write_run(model, settings, folder / "results.nc", **options)) as tree,
-    ):
+    with temporary_folder() as folder, open_unchecked(write_run(model, settings, folder / "results.nc", **options)) as tree:
         return tree.load()
 
 
@@ -190,7 +257,11 @@ def write_run(
 ) -> Path:
     """Simulate into the archive `out` (see `run`), and return the path of the file; it differs from `out` if that is a link."""
     check_counts(samples=settings.samples, seed=settings.seed, surfaces=settings.surfaces)
-    _check_choices(settings)
+    check_choice("keep", settings.keep, KEPT)
+    fields = settings.fields
+    if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
+        raise OptionError(f"fields is {fields!r}; expected a whole number, at least 2, or one of: {', '.join(FIELD_CHOICES)}")
+    check_choice("plan", settings.plan, PLANS)
     check_program(model, solver, method)
     check_identities([] if resume else [model], {"archive": out})
     target = None if until is None else Target.of(until)
@@ -198,22 +269,13 @@ def write_run(
         program = program_of(model, solver, method)
         program = replace(program, draws=program.draws.planned(settings.plan))
         if target:
-            target.check(program)
+            target.request.number_of([measure.name for measure in program.nominal.measures])  # refuses unknown measures
         write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
     if target:
         with open_unchecked(path) as results:
             if sentence := target.shortfall(results):
                 log.warning(sentence)
     return path
-
-
-def _check_choices(settings: Run) -> None:
-    """Raise OptionError for an invalid choice of `run`."""
-    keep, fields, plan = settings.keep, settings.fields, settings.plan
-    check_choice("keep", keep, KEPT)
-    if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
-        raise OptionError(f"fields is {fields!r}; expected a whole number, at least 2, or one of: {', '.join(FIELD_CHOICES)}")
-    check_choice("plan", plan, PLANS)
 
 
 def write_archive(
@@ -233,7 +295,7 @@ def write_archive(
         if is_resumed:
             writer = ArchiveWriter.resume(path, program, settings)
         else:
-            writer = ArchiveWriter(path, program, settings, sums.sizes)
+            writer = ArchiveWriter(path, program, settings, sums.fields.sizes)
         remaining = writer.samples - writer.rows
         announce(program, samples=remaining, seed=settings.seed, keep=settings.keep, threads=threads_of(client))
         _simulate(program, writer, sums, settings.seed, blocks, progress)
@@ -248,33 +310,32 @@ def _simulate(
 ) -> None:
     """Simulate the missing rows of an archive, write them with their sums, and check some of them against the surfaces."""
     sums.start_from(writer)
+
+    def commit(rows: dict[str, np.ndarray], block_sums: BlockTotals) -> None:
+        writer.append(rows)
+        sums.merge(block_sums)
+        if writer.is_checkpoint_due:
+            writer.write_checkpoint(sums.fields.numbers)
+
     try:
         # An interrupt, which only the main thread receives, cannot come between a block and its sums.
         with ThreadPoolExecutor(1) as commits:
             for block in blocks(sums.of_blocks, program, samples=writer.samples, seed=seed, start=writer.rows):
-                commits.submit(_commit, writer, sums, *block).result()
+                commits.submit(commit, *block).result()
                 if progress:
                     progress(writer.rows)
         with writer.completed(sums.groups):
             _check(program, writer, seed)
-            if writer.rows >= other_objectives.MIN_REALIZATIONS and not writer.has_objectives():
-                first = writer.first_outcomes(other_objectives.ROWS)
-                writer.write_group(OBJECTIVES_GROUP, other_objectives.by_objective(program, *first, blocks, seed))
+            if writer.rows >= MIN_COMPARED and not writer.has_objectives():
+                first = writer.first_outcomes(COMPARED_ROWS)
+                writer.write_group(OBJECTIVES_GROUP, by_objective(program, *first, blocks, seed))
     except BaseException:
         if writer.has_new_rows:
             if writer.is_between_blocks:
-                writer.write_checkpoint(sums.numbers)
+                writer.write_checkpoint(sums.fields.numbers)
             with writer.completed(sums.groups):
                 pass
         raise
-
-
-def _commit(writer: ArchiveWriter, sums: RunSums, rows: dict[str, np.ndarray], block_sums: BlockTotals) -> None:
-    """Add a block to an archive and to its sums."""
-    writer.append(rows)
-    sums.merge(block_sums)
-    if writer.is_checkpoint_due:
-        writer.write_checkpoint(sums.numbers)
 
 
 def _check(program: Program, writer: ArchiveWriter, seed: int) -> None:

@@ -3,8 +3,7 @@
 import pytest
 import typer
 
-from tolcontact.cli.app import app
-from tolcontact.cli.commands import COMMANDS, declared_command
+from tolcontact.cli.app import COMMANDS, app, declared_command
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -7,8 +7,8 @@ import numpy as np
 from tests import cases
 from tests.helpers import PAPER, joined, simulate
 from tests.units.compilation.recompiling import recompiled
-from tolcontact.compilation.active_set import ActiveSet
-from tolcontact.compilation.conic_plugin import Plugin
+from tolcontact.compilation.contact_solver import active_set, solve_active
+from tolcontact.compilation.solvers import Plugin
 from tolcontact.simulation import simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
@@ -47,8 +47,8 @@ def test_polishing_finds_the_solution_from_the_rows_that_carry():
     known = {"x": x, "lam_a": -lam, "lam_x": -bound}
     blurred = {name: values * (1 + 1e-5 * rng.normal(size=values.shape)) for name, values in known.items()}
     order = rng.permutation(size - slacks + rows)
-    active = ActiveSet.of_answer(problem, blurred, np.arange(rows - equal, rows), slacks)
-    y, lam_a, lam_x = active.answer(problem, order).values()
+    active, is_open = active_set(problem, blurred, np.arange(rows - equal, rows), slacks)
+    y, lam_a, lam_x = solve_active(problem, active, is_open, order).values()
     assert np.abs(y - x).max() < 1e-9
     assert np.abs(np.einsum("kij,kj->ki", H, y) + g + np.einsum("kij,ki->kj", A, lam_a) + lam_x).max() < 1e-10
     assert np.abs((np.einsum("kij,kj->ki", A, y) - lower)[carries]).max() < 1e-10

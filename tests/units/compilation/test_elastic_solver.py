@@ -54,7 +54,7 @@ def solved_by(solver, qp, arrays):
     assert not failed.any()
     size, multipliers = qp.assemble.size1_out("h"), solution["lam_a"]
     solution |= {"x": solution["x"][:, :size], "lam_x": solution["lam_x"][:, :size]}
-    solution["bent"] = qp.flexibility.bent(qp.elastic.reactions(multipliers, problem["length"]))
+    solution["bent"] = qp.flexibility.bent(-multipliers[:, : problem["length"].shape[1]] / problem["length"] * qp.scale)
     return qp.evaluators.finish(**inputs | problem | solution)
 
 

@@ -12,14 +12,12 @@ from tests import cases
 from tests.helpers import compiled, nightly
 from tests.units.compilation.recompiling import recompiled
 from tolcontact.code_cache import cache_folder
-from tolcontact.compilation import contact_qp, contact_rows
-from tolcontact.compilation.calls import inline
+from tolcontact.compilation import contact_qp, qp_terms
 from tolcontact.compilation.functions import InterpretedFunction
 from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
 from tolcontact.compilation.functions.native import NativeFunction
-from tolcontact.compilation.functions.operations import OPERATIONS
-from tolcontact.compilation.functions.translation import UnknownInstructionError
-from tolcontact.compilation.quadratic_terms import is_convex
+from tolcontact.compilation.functions.translation import OPERATIONS
+from tolcontact.compilation.qp_terms import inline, is_convex
 from tolcontact.discretization import discretize
 from tolcontact.mechanics.groups import contact_groups
 from tolcontact.mechanics.pair_gaps import pair_gaps
@@ -44,7 +42,7 @@ def test_compiled_functions_equal_interpreted_ones_to_the_last_bit(name, method)
     nominal = discretize(PLANAR[name]())
     for group in contact_groups(nominal, method):
         pairs = [nominal.pairs[index] for index in group.pairs]
-        standing = [contact_rows.standing_points(pair, pair_gaps(pair).compiled(nominal.input_count), method) for pair in pairs]
+        standing = [qp_terms.standing_points(pair, pair_gaps(pair).compiled(nominal.input_count), method) for pair in pairs]
         qp = contact_qp.contact_qp(nominal, group, method, standing)
         for function in (qp.assemble, qp.finish):
             inputs = [RNG.normal(size=(7, function.nnz_in(k))) for k in range(function.n_in())]
@@ -86,7 +84,7 @@ def test_a_compiled_call_does_what_casadi_does():
 def test_an_instruction_without_translation_is_left_to_casadi():
     x = ca.SX.sym("x")
     function = ca.Function("f", [x], [ca.erf(x)])
-    with pytest.raises(UnknownInstructionError):
+    with pytest.raises(NotImplementedError):
         NativeFunction(function)
 
 

@@ -11,9 +11,9 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import EXACT, PAPER, ROOT, compiled, joined, nightly, simulate
 from tolcontact.compilation import ContactGroup
-from tolcontact.compilation.calls import FunctionCalls, inline
 from tolcontact.compilation.contact_qp import ENERGY_INPUTS, ContactQP, Evaluators, contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
+from tolcontact.compilation.qp_terms import FunctionCalls, inline
 from tolcontact.simulation import simulate_blocks
 
 ACCURACY = 1e-11  # mm: rounding of poses, over parts of some 100 mm

@@ -15,9 +15,9 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import compiled, nightly
 from tolcontact.compilation import ContactGroup, NamedFunction
-from tolcontact.compilation.calls import inline
 from tolcontact.compilation.contact_qp import ContactQP, Evaluators, contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
+from tolcontact.compilation.qp_terms import inline
 from tolcontact.compilation.solver import SolverChoice
 from tolcontact.compilation.solvers import SOLVERS
 from tolcontact.mechanics import GapMap

@@ -4,7 +4,7 @@ import numpy as np
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.workflow.run_sums import MAX_REALIZATIONS
+from tolcontact.workflow.runs import MAX_COUNTED
 
 
 def test_a_block_touches_in_half_of_the_realizations_at_all_its_points():
@@ -12,10 +12,10 @@ def test_a_block_touches_in_half_of_the_realizations_at_all_its_points():
     _, lower, upper = results.tolcontact.summary().carried.sel(pair="seat").values
     assert lower < 0.5 < upper and upper - lower < 0.04
     found = results.tolcontact.touching()
-    share = (results["status"].values[:MAX_REALIZATIONS] == tc.Status.RESOLVED).mean()
-    assert found.attrs["realizations"] == MAX_REALIZATIONS and (found["pair"] == "seat").all()
+    share = (results["status"].values[:MAX_COUNTED] == tc.Status.RESOLVED).mean()
+    assert found.attrs["realizations"] == MAX_COUNTED and (found["pair"] == "seat").all()
     assert np.abs(found["touching"].sel(interval="estimate") - share).max() < 1e-12
     archived = results["contact"]  # for whoever reads an archive without tolcontact
     assert np.array_equal(archived["touching"], found["touching"].sel(interval="estimate"))
     assert np.array_equal(archived["touching_interval"], found["touching"].sel(interval=["lower", "upper"]))
-    assert int(archived["touching_realizations"]) == MAX_REALIZATIONS and archived["touching"].dims == ("point",)
+    assert int(archived["touching_realizations"]) == MAX_COUNTED and archived["touching"].dims == ("point",)

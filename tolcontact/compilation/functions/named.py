@@ -5,7 +5,8 @@ import functools
 import math
 import threading
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from tolcontact import code_cache
 from tolcontact.arrays import Array, Float, Real
 from tolcontact.compilation.functions.native import NativeFunction, key_of
-from tolcontact.compilation.functions.translation import UnknownInstructionError, called
+from tolcontact.compilation.functions.translation import called
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
@@ -29,10 +30,10 @@ class InterpretedFunction:
     def __init__(self, function: ca.Function, fixed_inputs: Mapping[int, np.ndarray] | None = None) -> None:
         # A buffer keeps the memory of the Function that it calls. In another Function, a solver takes a free memory each time.
         inputs = [ca.MX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
-        caller = ca.Function("caller", inputs, function.call(inputs))
-        self._calls = [_Buffers(caller, width, fixed_inputs or {}) for width in (*WIDTHS, 1)]
+        self._caller, self._fixed_inputs = ca.Function("caller", inputs, function.call(inputs)), fixed_inputs or {}
         self._sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
         self._solvers = [function] if function.is_a("Conic") else []
+        self._buffers: dict[int, tuple[Any, ...]] = {}  # by width, see _allocate
         self._is_new = True
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
@@ -40,112 +41,73 @@ class InterpretedFunction:
 
         Outputs are NaN if the evaluation failed.
         """
+        count, start = len(inputs[0]), 0
+        results, failed = [np.empty((count, size)) for size in self._sizes_out], np.zeros(count, dtype=bool)
         with quiet():  # plugins may print in every evaluation
-            return self._evaluated(inputs)
-
-    def _evaluated(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
-        count = len(inputs[0])
-        results = [np.empty((count, size)) for size in self._sizes_out]
-        failed = np.zeros(count, dtype=bool)
-        for call, start, stop in self._batches(count):
-            if not self._succeeds(call, slice(start, stop), inputs, results):
-                # A plugin that fails on one realization may end the whole call (qpOASES does), so each is evaluated alone.
-                for k in range(start, stop):
-                    if not self._succeeds(self._calls[-1], slice(k, k + 1), inputs, results):
-                        failed[k] = True
-                        for result in results:
-                            result[k] = np.nan
+            while start < count:
+                # The very first realization is evaluated alone, since other threads wait for it.
+                remaining = 1 if self._is_new else count - start
+                width = WIDTHS[0] if remaining >= WIDTHS[0] else WIDTHS[1] if remaining >= WIDTHS[1] // 2 else 1
+                stop = min(start + width, count)
+                if not self._succeeds(width, slice(start, stop), inputs, results):
+                    # A plugin that fails on one realization may end the whole call (qpOASES does): each is evaluated alone.
+                    for k in range(start, stop):
+                        if not self._succeeds(1, slice(k, k + 1), inputs, results):
+                            failed[k] = True
+                            for result in results:
+                                result[k] = np.nan
+                start = stop
         return results, failed
 
-    def _batches(self, count: int) -> Iterator[tuple["_Buffers", int, int]]:
-        """Yield buffers and the range of realizations they evaluate; the narrower of WIDTHS may have unused rows at the end.
-
-        The very first realization is evaluated alone, since other threads wait for it.
-        """
-        start = 0
-        while start < count:
-            remaining = 1 if self._is_new else count - start
-            call = (
-                self._calls[0] if remaining >= WIDTHS[0] else self._calls[1] if remaining >= WIDTHS[1] // 2 else self._calls[2]
-            )
-            stop = min(start + call.width, count)
-            yield call, start, stop
-            start = stop
-
-    def _succeeds(self, call: "_Buffers", rows: slice, inputs: Sequence[np.ndarray], results: Sequence[np.ndarray]) -> bool:
-        """Evaluate some rows of the inputs, and return whether it succeeded; if not, the solvers get a new memory.
+    def _succeeds(self, width: int, rows: slice, inputs: Sequence[np.ndarray], results: Sequence[np.ndarray]) -> bool:
+        """Evaluate up to `width` rows of the inputs, and return whether it succeeded; if not, the solvers get a new memory.
 
         qpOASES starts from its last problem, and after one failure it always fails.
         """
         # The first evaluation constructs CasADi objects: the memory of solvers, which wider calls use later.
         with CONSTRUCTION_LOCK if self._is_new else contextlib.nullcontext():
-            succeeds = call([array[rows] for array in inputs], [result[rows] for result in results])
+            if width not in self._buffers:
+                with CONSTRUCTION_LOCK:
+                    self._buffers[width] = self._allocate(width)
+            evaluate, buffer, arguments, outputs = self._buffers[width]
+            count = rows.stop - rows.start
+            free = (array for i, array in enumerate(arguments) if i not in self._fixed_inputs)
+            for array, values in zip(free, inputs, strict=True):
+                array[:count] = values[rows]
+                array[count:] = values[rows.stop - 1]  # unused rows repeat the last one
+            try:
+                evaluate()
+            except RuntimeError:  # CasADi's only exception: bounds that are NaN
+                succeeds = False
+            else:
+                for array, result in zip(outputs, results, strict=True):
+                    result[rows] = array[:count]
+                succeeds = bool(buffer.ret() == 0)
         if not succeeds:
             for solver in self._solvers:
                 solver.checkout()  # takes the corrupted memory and never releases it: the next evaluation gets another
         self._is_new = not succeeds
         return succeeds
 
-
-class _Buffers:
-    """A Function of `width` realizations at once, with arrays at fixed addresses, which the first call allocates."""
-
-    def __init__(self, function: ca.Function, width: int, fixed_inputs: Mapping[int, np.ndarray]) -> None:
-        self._function, self.width, self._fixed_inputs = function, width, fixed_inputs
-        self._evaluate: Callable[[], None] | None = None
-
-    def _allocate(self) -> Callable[[], None]:
-        """Allocate the arrays, and return a callable that evaluates the Function on them."""
-        width, fixed_inputs = self.width, self._fixed_inputs
-        function = self._function.map(width) if width > 1 else self._function
-        self._buffer, evaluate = function.buffer()
-        inputs = [np.zeros((width, function.nnz_in(i) // width)) for i in range(function.n_in())]
-        self._outputs = [np.zeros((width, function.nnz_out(i) // width)) for i in range(function.n_out())]
-        for i, array in enumerate(inputs):
-            if i in fixed_inputs:
-                array[:] = fixed_inputs[i]
-            self._buffer.set_arg(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
-        for i, array in enumerate(self._outputs):
-            self._buffer.set_res(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
-        self._all = inputs  # the buffer does not keep them alive
-        self._inputs = [array for i, array in enumerate(inputs) if i not in fixed_inputs]
-        return evaluate  # type: ignore[no-any-return]
-
-    def __call__(self, inputs: Sequence[np.ndarray], outputs: Sequence[np.ndarray]) -> bool:
-        """Evaluate for up to `width` realizations; unused rows repeat the last one. Return whether it succeeded."""
-        count = len(inputs[0])
-        if self._evaluate is None:
-            with CONSTRUCTION_LOCK:
-                self._evaluate = self._allocate()
-        for buffer, array in zip(self._inputs, inputs, strict=True):
-            buffer[:count] = array
-            buffer[count:] = array[-1:]
-        try:
-            self._evaluate()
-        except RuntimeError:  # CasADi's only exception: bounds that are NaN
-            return False
-        for buffer, array in zip(self._outputs, outputs, strict=True):
-            array[:] = buffer[:count]
-        return bool(self._buffer.ret() == 0)
+    def _allocate(self, width: int) -> tuple[Any, ...]:
+        """Return a callable that evaluates the Function `width` times, its buffer, and the arrays of arguments and outputs."""
+        function = self._caller.map(width) if width > 1 else self._caller
+        buffer, evaluate = function.buffer()
+        arguments = [np.zeros((width, function.nnz_in(i) // width)) for i in range(function.n_in())]
+        outputs = [np.zeros((width, function.nnz_out(i) // width)) for i in range(function.n_out())]
+        for i, array in enumerate(arguments):  # the buffer does not keep them alive
+            if i in self._fixed_inputs:
+                array[:] = self._fixed_inputs[i]
+            buffer.set_arg(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
+        for i, array in enumerate(outputs):
+            buffer.set_res(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
+        return evaluate, buffer, arguments, outputs
 
 
 # Evaluations, in all processes, after which a Function without calls is compiled. Compiling takes as long as interpreting this
 # number of evaluations once or twice. So the total time is at most about three times the time of the best choice in hindsight.
 MIN_COMPILED_CALLS = 10_000
 MAX_INSTRUCTIONS = 300_000  # that are compiled; more are interpreted, since compiling them takes more than a gigabyte
-
-
-class Evaluations:
-    """The number of evaluations of a Function by this process and by earlier processes that stored it."""
-
-    def __init__(self, key: str) -> None:
-        self._key = f"{key}-evaluations"
-        stored = code_cache.load(self._key) or b""
-        self.number = int(stored) if stored.isdigit() else 0
-
-    def store(self) -> None:
-        """Store the number for later processes."""
-        code_cache.write(self._key, str(self.number).encode())
 
 
 def _instructions(function: ca.Function) -> tuple[int, int]:
@@ -172,7 +134,7 @@ class NamedFunction:
         compiled, executed = _instructions(function)
         self._may_be_compiled = compiled <= MAX_INSTRUCTIONS
         self._min_calls = MIN_COMPILED_CALLS * compiled // max(executed, 1)
-        self._evaluations: Evaluations | None = None
+        self._evaluations: list[int] | None = None  # the number of evaluations by this process and by earlier ones
         self._lock = threading.Lock()
 
     @classmethod
@@ -203,7 +165,7 @@ class NamedFunction:
     def _compiled(self, count: int) -> NativeFunction | None:
         """Return the machine code for `count` more evaluations, or None while CasADi interprets the Function."""
         # CasADi interprets a Function that LLVM cannot compile on this machine.
-        with contextlib.suppress(UnknownInstructionError, RuntimeError):
+        with contextlib.suppress(RuntimeError):
             if self.native is None and self._is_due(count):
                 self.native = NativeFunction(self.function)  # other threads interpret meanwhile
         return self.native
@@ -218,10 +180,12 @@ class NamedFunction:
                 self.native = NativeFunction.from_cache(self.function, key)
                 if self.native is not None:
                     return False
-                self._evaluations = Evaluations(key)
-                weakref.finalize(self, self._evaluations.store)
-            self._evaluations.number += count
-            self._may_be_compiled = self._evaluations.number <= self._min_calls
+                name = f"{key}-evaluations"
+                stored = code_cache.load(name) or b""
+                self._evaluations = [int(stored) if stored.isdigit() else 0]
+                weakref.finalize(self, lambda number: code_cache.write(name, str(number[0]).encode()), self._evaluations)
+            self._evaluations[0] += count
+            self._may_be_compiled = self._evaluations[0] <= self._min_calls
             return not self._may_be_compiled
 
 

@@ -17,9 +17,8 @@ import numpy as np
 from llvmlite import binding, ir
 
 from tolcontact import code_cache
-from tolcontact.compilation.functions import operations, translation
-from tolcontact.compilation.functions.operations import LANES
-from tolcontact.compilation.functions.translation import memory_of, module_of, sizes_of
+from tolcontact.compilation.functions import translation
+from tolcontact.compilation.functions.translation import LANES, memory_of, module_of, sizes_of
 from tolcontact.system.resources import free_address_space
 
 MIN_MEMORY, MEMORY_FACTOR = 1 << 26, 16  # bytes, and bytes per character of a module: LLVM takes 9 for 88 000 instructions
@@ -31,7 +30,7 @@ class NativeFunction:
     def __init__(self, function: ca.Function, code: bytes | None = None) -> None:
         """Load the given machine code of the Function, or compile the Function and store its code in the cache.
 
-        Raises UnknownInstructionError for a Function that cannot be compiled.
+        Raises NotImplementedError for a Function that cannot be compiled.
         """
         self.sizes_in, self.sizes_out = sizes_of(function)
         self._engine = _loaded(code) if code else _compiled(module_of(function), key_of(function))
@@ -70,7 +69,7 @@ def key_of(function: ca.Function, host: bytes | None = None) -> str:
 @functools.cache
 def host_description() -> bytes:
     """Return a description of the processor, the libraries and this translation, which also determine the machine code."""
-    code = b"".join(Path(file).read_bytes() for file in (__file__, translation.__file__, operations.__file__))
+    code = b"".join(Path(file).read_bytes() for file in (__file__, translation.__file__))
     features = binding.get_host_cpu_features().flatten()
     parts = [binding.get_default_triple(), binding.get_host_cpu_name(), features, version("llvmlite"), version("casadi")]
     return "\n".join(parts).encode() + code

@@ -6,89 +6,143 @@ numbers through memory. A Function that another one calls is translated once, ho
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import accumulate, groupby
-from typing import NamedTuple
+from operator import itemgetter
 
 import casadi as ca
 from llvmlite import ir
 
-from tolcontact.compilation.functions.operations import DOUBLE, LANES, OPERATIONS, VECTOR, constant
-
 SEGMENT = 1000  # instructions
 MIN_MOVED = 8  # inputs or results in a row that a loop copies
+VECTOR_ALIGNMENT = 8  # bytes: guaranteed alignment of the memory
+LANES = 4  # realizations
+DOUBLE = ir.DoubleType()
+VECTOR = ir.VectorType(DOUBLE, LANES)
+
+
+def constant(value: float) -> ir.Constant:
+    """Return a number for all realizations."""
+    return VECTOR([DOUBLE(value)] * LANES)
+
+
+ZERO, ONE = constant(0.0), constant(1.0)
+
+
+def _truth(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
+    """Return 1.0 or 0.0 for a truth value."""
+    return builder.select(value, ONE, ZERO)
+
+
+def _holds(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
+    return builder.fcmp_unordered("!=", x, ZERO)
+
+
+def _extreme(builder: ir.IRBuilder, sign: str, x: ir.Value, y: ir.Value) -> ir.Value:
+    """Return C's fmin ("<=") or fmax (">="): the other operand if one is NaN, and the first of two equal operands."""
+    return builder.select(builder.or_(builder.fcmp_ordered(sign, x, y), builder.fcmp_unordered("uno", y, y)), x, y)
+
+
+def _call(name: str) -> Callable[[ir.IRBuilder, ir.Value], ir.Value]:
+    def call(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
+        full = f"llvm.{name}.v{LANES}f64"
+        declared = builder.module.globals.get(full) or ir.Function(builder.module, ir.FunctionType(VECTOR, [VECTOR]), full)
+        return builder.call(declared, [x])
+
+    return call
+
+
+OPERATIONS: dict[int, Callable[..., ir.Value]] = {
+    ca.OP_ASSIGN: lambda b, x: x,
+    ca.OP_ADD: ir.IRBuilder.fadd,
+    ca.OP_SUB: ir.IRBuilder.fsub,
+    ca.OP_MUL: ir.IRBuilder.fmul,
+    ca.OP_DIV: ir.IRBuilder.fdiv,
+    ca.OP_NEG: ir.IRBuilder.fneg,
+    ca.OP_SQ: lambda b, x: b.fmul(x, x),
+    ca.OP_TWICE: lambda b, x: b.fadd(x, x),
+    ca.OP_INV: lambda b, x: b.fdiv(ONE, x),
+    ca.OP_FMIN: lambda b, x, y: _extreme(b, "<=", x, y),
+    ca.OP_FMAX: lambda b, x, y: _extreme(b, ">=", x, y),
+    ca.OP_LT: lambda b, x, y: _truth(b, b.fcmp_ordered("<", x, y)),
+    ca.OP_LE: lambda b, x, y: _truth(b, b.fcmp_ordered("<=", x, y)),
+    ca.OP_EQ: lambda b, x, y: _truth(b, b.fcmp_ordered("==", x, y)),
+    ca.OP_NE: lambda b, x, y: _truth(b, b.fcmp_unordered("!=", x, y)),
+    ca.OP_NOT: lambda b, x: _truth(b, b.not_(_holds(b, x))),
+    ca.OP_AND: lambda b, x, y: _truth(b, b.and_(_holds(b, x), _holds(b, y))),
+    ca.OP_OR: lambda b, x, y: _truth(b, b.or_(_holds(b, x), _holds(b, y))),
+    ca.OP_IF_ELSE_ZERO: lambda b, x, y: b.select(_holds(b, x), y, ZERO),
+    **{getattr(ca, f"OP_{name.upper()}"): _call(name) for name in ("sqrt", "fabs", "sin", "cos", "exp", "log")},
+}
 _INDEX = ir.IntType(64)
 _MEMORY = VECTOR.as_pointer()
 _TRANSLATED = ir.FunctionType(ir.VoidType(), [_MEMORY] * 3)
-VECTOR_ALIGNMENT = 8  # bytes: guaranteed alignment of the memory
-
-
-class UnknownInstructionError(Exception):
-    """A Function has an instruction without a translation; CasADi can still interpret it."""
+Instruction = tuple[int, list[int], list[int], int]
+# An operation, the work entries that it writes and reads (for outputs and inputs, argument and entry), and its index in the
+# Function.
 
 
 def sizes_of(function: ca.Function) -> tuple[list[int], list[int]]:
     """Return the number of stored entries of each input and of each output."""
-    inputs = [function.nnz_in(i) for i in range(function.n_in())]
-    return inputs, [function.nnz_out(i) for i in range(function.n_out())]
+    return [*map(function.nnz_in, range(function.n_in()))], [*map(function.nnz_out, range(function.n_out()))]
 
 
 def module_of(function: ca.Function) -> ir.Module:
     """Return a module with `void evaluate(count, arrays, memory)`: all instructions, for LANES realizations at once.
 
-    `arrays` are inputs and results. In the last iteration, lanes beyond `count` repeat the last realization.
+    `arrays` are inputs and results. In the last iteration, lanes beyond `count` repeat the last realization. Raises
+    NotImplementedError for an instruction without a translation; CasADi can still interpret it.
     """
     module = ir.Module("contact")
     translated = _Translation(module).function(function)
     signature = ir.FunctionType(ir.VoidType(), [_INDEX, DOUBLE.as_pointer().as_pointer(), _MEMORY])
     evaluate = ir.Function(module, signature, "evaluate")
     count, arrays, memory = evaluate.args
-    entry, body, done = (evaluate.append_basic_block(name) for name in ("entry", "body", "done"))
-    builder = ir.IRBuilder(entry)
-    last = builder.sub(count, _INDEX(1))
-    builder.cbranch(builder.icmp_signed("<=", count, _INDEX(0)), done, body)
-    builder.position_at_end(body)
-    k = builder.phi(_INDEX)
-    k.add_incoming(_INDEX(0), entry)
-    lanes = [builder.add(k, _INDEX(lane)) for lane in range(LANES)]
-    lanes = [builder.select(builder.icmp_signed("<", lane, last), lane, last) for lane in lanes]
     inputs, outputs = sizes_of(function)
     types = [DOUBLE.as_pointer(), _MEMORY, *[_INDEX] * LANES]
     gather, scatter = _loop(module, "gather", types, _gather), _loop(module, "scatter", types, _scatter)
     starts = [0, *accumulate([*inputs, *outputs])]
-    results, work = (builder.gep(memory, [_INDEX(n)]) for n in (sum(inputs), starts[-1]))
 
-    def copy(function: ir.Function, arguments: range) -> None:
-        for i in arguments:
-            array = builder.load(builder.gep(arrays, [_INDEX(i)]))
-            place = builder.gep(memory, [_INDEX(starts[i])])
-            builder.call(function, [_INDEX(starts[i + 1] - starts[i]), array, place, *lanes])
+    def evaluate_lanes(builder: ir.IRBuilder, first: ir.Value) -> None:
+        last = builder.sub(count, _INDEX(1))
+        lanes = [builder.add(first, _INDEX(lane)) for lane in range(LANES)]
+        lanes = [builder.select(builder.icmp_signed("<", lane, last), lane, last) for lane in lanes]
+        results, work = (builder.gep(memory, [_INDEX(n)]) for n in (sum(inputs), starts[-1]))
 
-    copy(gather, range(len(inputs)))
-    builder.call(translated, [memory, results, work])
-    copy(scatter, range(len(inputs), len(inputs) + len(outputs)))
-    following = builder.add(k, _INDEX(LANES))
-    k.add_incoming(following, body)
-    builder.cbranch(builder.icmp_signed("<", following, count), body, done)
-    ir.IRBuilder(done).ret_void()
+        def copy(function: ir.Function, arguments: range) -> None:
+            for i in arguments:
+                array = builder.load(builder.gep(arrays, [_INDEX(i)]))
+                place = builder.gep(memory, [_INDEX(starts[i])])
+                builder.call(function, [_INDEX(starts[i + 1] - starts[i]), array, place, *lanes])
+
+        copy(gather, range(len(inputs)))
+        builder.call(translated, [memory, results, work])
+        copy(scatter, range(len(inputs), len(inputs) + len(outputs)))
+
+    _repeat(evaluate, count, LANES, evaluate_lanes)
     return module
 
 
-def _loop(module: ir.Module, name: str, types: Sequence[ir.Type], step: Callable[..., None]) -> ir.Function:
-    """Return a function `void (size, arguments...)` that repeats a step for each index below the size."""
+def _repeat(function: ir.Function, count: ir.Value, step: int, emit: Callable[[ir.IRBuilder, ir.Value], None]) -> None:
+    """Emit the code of a function: a loop over every index below a count, or every one of some `step`."""
+    entry, body, done = (function.append_basic_block(name) for name in ("entry", "body", "done"))
+    builder = ir.IRBuilder(entry)
+    builder.cbranch(builder.icmp_signed("<=", count, _INDEX(0)), done, body)
+    builder.position_at_end(body)
+    index = builder.phi(_INDEX)
+    index.add_incoming(_INDEX(0), entry)
+    emit(builder, index)
+    following = builder.add(index, _INDEX(step))
+    index.add_incoming(following, body)
+    builder.cbranch(builder.icmp_signed("<", following, count), body, done)
+    ir.IRBuilder(done).ret_void()
+
+
+def _loop(module: ir.Module, name: str, types: Sequence[ir.Type], emit: Callable[..., None]) -> ir.Function:
+    """Return a function `void (size, arguments...)` that repeats some code for each index below the size."""
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [_INDEX, *types]), name)
     function.linkage = "internal"
     function.attributes.add("noinline")
     size, *arguments = function.args
-    entry, body, done = (function.append_basic_block(block) for block in ("entry", "body", "done"))
-    builder = ir.IRBuilder(entry)
-    builder.cbranch(builder.icmp_signed("<=", size, _INDEX(0)), done, body)
-    builder.position_at_end(body)
-    index = builder.phi(_INDEX)
-    index.add_incoming(_INDEX(0), entry)
-    step(builder, index, size, arguments)
-    following = builder.add(index, _INDEX(1))
-    index.add_incoming(following, body)
-    builder.cbranch(builder.icmp_signed("<", following, size), body, done)
-    ir.IRBuilder(done).ret_void()
+    _repeat(function, size, 1, lambda builder, index: emit(builder, index, size, arguments))
     return function
 
 
@@ -118,18 +172,6 @@ def _transfer(builder: ir.IRBuilder, k: ir.Value, size: ir.Value, arguments: Seq
     first, second = (builder.load(builder.gep(table, [k])) for table in (source_table, target_table))
     value = builder.load(builder.gep(source, [first]), align=VECTOR_ALIGNMENT)
     builder.store(value, builder.gep(target, [second]), align=VECTOR_ALIGNMENT)
-
-
-class Instruction(NamedTuple):
-    """An instruction of a Function: the work entries that it writes and reads; for inputs and outputs, argument and entry.
-
-    position   its index in the Function
-    """
-
-    operation: int
-    to: list[int]
-    operands: list[int]
-    position: int
 
 
 def _accesses(part: Sequence[Instruction]) -> tuple[set[int], set[int]]:
@@ -169,8 +211,7 @@ class _Translation:
         """Return the translation of a Function."""
         key = function.__hash__()
         if key not in self._functions:
-            segments = self._segments(function)
-            translated = self._new()
+            segments, translated = self._segments(function), self._new()
             builder = ir.IRBuilder(translated.append_basic_block("entry"))
             for segment in segments:
                 builder.call(segment, translated.args)
@@ -189,12 +230,11 @@ class _Translation:
     def _segments(self, function: ca.Function) -> list[ir.Function]:
         """Return functions that together execute all instructions; each stores the work entries that later ones read."""
         instructions = [
-            Instruction(function.instruction_id(k), function.instruction_output(k), function.instruction_input(k), k)
+            (function.instruction_id(k), function.instruction_output(k), function.instruction_input(k), k)
             for k in range(function.n_instructions())
         ]
         parts = [instructions[k : k + SEGMENT] for k in range(0, len(instructions), SEGMENT)]
-        read_later: set[int] = set()
-        stored: list[set[int]] = []
+        read_later, stored = set[int](), list[set[int]]()
         for part in reversed(parts):
             reads, writes = _accesses(part)
             stored.insert(0, writes & read_later)
@@ -211,7 +251,7 @@ class _Translation:
         builder = ir.IRBuilder(segment.append_basic_block("entry"))
         starts_in, starts_out = ([0, *accumulate(sizes)] for sizes in sizes_of(function))
         work = _Work(builder, memory)
-        for operation, run in groupby(part, lambda instruction: instruction.operation):
+        for operation, run in groupby(part, itemgetter(0)):
             instructions = [*run]
             if operation == ca.OP_INPUT and len(instructions) >= MIN_MOVED:
                 entries = [starts_in[i] + entry for _, _, (i, entry), _ in instructions]
@@ -229,8 +269,10 @@ class _Translation:
                         work.write(to[0], work.load(inputs, starts_in[operands[0]] + operands[1]))
                     elif operation == ca.OP_CONST:
                         work.write(to[0], constant(function.instruction_constant(k)))
+                    elif operation in OPERATIONS:
+                        work.write(to[0], OPERATIONS[operation](builder, *(work[index] for index in operands)))
                     else:
-                        work.write(to[0], _operation(operation)(builder, *(work[index] for index in operands)))
+                        raise NotImplementedError(f"instruction {operation} has no translation")
         work.flush(stored)
         builder.ret_void()
         return segment
@@ -268,13 +310,6 @@ class _Translation:
         table = ir.GlobalVariable(self._module, values.type, self._module.get_unique_name("table"))
         table.linkage, table.global_constant, table.initializer = "internal", True, values
         return builder.gep(table, [_INDEX(0), _INDEX(0)])
-
-
-def _operation(operation: int) -> Callable[..., ir.Value]:
-    """Return the translation of an operation. Raises UnknownInstructionError if it has none."""
-    if operation not in OPERATIONS:
-        raise UnknownInstructionError(f"instruction {operation}")
-    return OPERATIONS[operation]
 
 
 class _Work(dict[int, ir.Value]):

@@ -6,13 +6,10 @@ factorization eliminates the joints in minimum-degree order. If H couples bodies
 others, its block Cholesky factor first transforms the rows. Each realization is solved from its own data: its answer does not
 depend on other realizations.
 
-layout                the bodies that a row touches, and the elimination orders, from the sparsity, once
-factor_kernel         the Gram matrix of the active rows
+factor_kernel         the factors of the Gram matrix of the active rows, and of H
 active_set_kernel     changes of the active set: rows enter and leave, slacks open and close
-search_kernel         the search for the active set: in all joints at once, then one by one
-hessian_kernel        the factor of H
-solve_kernel          a batch of QPs
-graph_solver          the solver, and its entry in the table of solvers
+solve_kernel          a batch of QPs: the search for the active set, in all joints at once, then one by one
+graph_solver          the solver, its entry in the table of solvers, and the elimination orders, from the sparsity, once
 """
 
 from tolcontact.compilation.graph.graph_solver import GraphChoice, GraphSolver

@@ -3,21 +3,6 @@
 import numpy as np
 
 from tolcontact.compilation.graph.factor_kernel import (
-    BOUND,
-    CHANGE,
-    CHANGED,
-    COUNT,
-    DIRECTION,
-    FRESH,
-    GRADIENT,
-    MULTIPLIER,
-    OPEN,
-    OPENING,
-    PRICE,
-    SCATTER,
-    STEP,
-    VALUE,
-    Y,
     add_row,
     append,
     dependence,
@@ -28,7 +13,6 @@ from tolcontact.compilation.graph.factor_kernel import (
     solve,
     squared_length,
 )
-from tolcontact.compilation.graph.layout import JOINT, POSITION, ROW, SLACK
 from tolcontact.compiled import inlined_inner
 
 FEASIBLE = 1e-12  # mm: a row of length 1 is violated if it misses its bound by more
@@ -42,13 +26,13 @@ CHECKED, ENTERED, PARTIAL, STUCK = range(4)
 @inlined_inner
 def multiply(layout, work):  # type: ignore[no-untyped-def]
     """Compute the multipliers of the active rows, as equations, and the solution; return the largest multiplier."""
-    multipliers = work.positions[MULTIPLIER]
-    for j in range(work.joints.shape[0]):
-        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+    multipliers = work.multiplier
+    for j in range(work.counts.size):
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             row = work.active[t]
-            multipliers[t] = work.rows[row, BOUND] + product(layout.blocks, work.slopes, row, work.vectors[GRADIENT])
-            if work.joints[j, OPEN]:
-                multipliers[t] += work.rows[row, OPENING] * work.slacks[PRICE, j]
+            multipliers[t] = work.bound[row] + product(layout.blocks, work.slopes, row, work.gradient)
+            if work.open[j]:
+                multipliers[t] += work.opening[row] * work.price[j]
     solve(layout, work, multipliers)
     return move(layout, work)
 
@@ -56,18 +40,18 @@ def multiply(layout, work):  # type: ignore[no-untyped-def]
 @inlined_inner
 def move(layout, work):  # type: ignore[no-untyped-def]
     """Compute the solution of the multipliers, and return the largest multiplier."""
-    for body in range(work.vectors[Y].shape[0]):
+    for body in range(work.y.shape[0]):
         for c in range(6):
-            work.vectors[Y, body, c] = -work.vectors[GRADIENT, body, c]
+            work.y[body, c] = -work.gradient[body, c]
     largest = 0.0
-    for j in range(work.joints.shape[0]):
-        slack = -work.slacks[PRICE, j]
-        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            row, multiplier = work.active[t], work.positions[MULTIPLIER, t]
-            add_row(layout.blocks, work.slopes, row, multiplier, work.vectors[Y])
-            slack += work.rows[row, OPENING] * multiplier
+    for j in range(work.counts.size):
+        slack = -work.price[j]
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
+            row, multiplier = work.active[t], work.multiplier[t]
+            add_row(layout.blocks, work.slopes, row, multiplier, work.y)
+            slack += work.opening[row] * multiplier
             largest = max(largest, abs(multiplier))
-        work.slacks[VALUE, j] = slack  # for a closed slack, this is its multiplier times -1
+        work.value[j] = slack  # for a closed slack, this is its multiplier times -1
     return largest
 
 
@@ -77,18 +61,18 @@ def refine(layout, work):  # type: ignore[no-untyped-def]
     missed = np.inf
     for _ in range(REFINEMENTS):
         remainder = 0.0
-        for j in range(work.joints.shape[0]):
-            for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-                work.positions[STEP, t] = -excess(layout, work, work.active[t])
-                remainder = max(remainder, abs(work.positions[STEP, t]))
+        for j in range(work.counts.size):
+            for t in range(layout.first[j], layout.first[j] + work.counts[j]):
+                work.step[t] = -excess(layout, work, work.active[t])
+                remainder = max(remainder, abs(work.step[t]))
         helps = remainder > FEASIBLE and remainder < missed / 2
         missed = remainder
         if not helps:
             break
-        solve(layout, work, work.positions[STEP])
-        for j in range(work.joints.shape[0]):
-            for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-                work.positions[MULTIPLIER, t] += work.positions[STEP, t]
+        solve(layout, work, work.step)
+        for j in range(work.counts.size):
+            for t in range(layout.first[j], layout.first[j] + work.counts[j]):
+                work.multiplier[t] += work.step[t]
         move(layout, work)
     return missed
 
@@ -96,19 +80,19 @@ def refine(layout, work):  # type: ignore[no-untyped-def]
 @inlined_inner
 def excess(layout, work, row):  # type: ignore[no-untyped-def]
     """Return the value of a row less its bound."""
-    j = layout.rows[row, JOINT]
-    value = product(layout.blocks, work.slopes, row, work.vectors[Y]) - work.rows[row, BOUND]
-    if work.joints[j, OPEN]:
-        value += work.rows[row, OPENING] * work.slacks[VALUE, j]
+    j = layout.joint[row]
+    value = product(layout.blocks, work.slopes, row, work.y) - work.bound[row]
+    if work.open[j]:
+        value += work.opening[row] * work.value[j]
     return value
 
 
 @inlined_inner
 def toggle(layout, work, j):  # type: ignore[no-untyped-def]
     """Open the slack of a joint, or close it."""
-    work.joints[j, OPEN] = 1 - work.joints[j, OPEN]
-    work.joints[j, FRESH] = 0
-    work.joints[j, CHANGED] = 1
+    work.open[j] = 1 - work.open[j]
+    work.fresh[j] = 0
+    work.changed[j] = 1
 
 
 @inlined_inner
@@ -118,17 +102,17 @@ def release(layout, work, tolerance):  # type: ignore[no-untyped-def]
     Return the number of changes.
     """
     changes = 0
-    for j in range(work.joints.shape[0]):
-        if layout.joints[j, SLACK] < 0:
+    for j in range(work.counts.size):
+        if layout.slack[j] < 0:
             continue
-        lowest, position = -tolerance, layout.joints[j, POSITION]
-        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            if work.positions[MULTIPLIER, t] < lowest:
-                lowest, position = work.positions[MULTIPLIER, t], t
+        lowest, position = -tolerance, layout.first[j]
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
+            if work.multiplier[t] < lowest:
+                lowest, position = work.multiplier[t], t
         if lowest < -tolerance:
             remove(layout, work, position)
             changes += 1
-        if not work.joints[j, OPEN] and work.slacks[VALUE, j] > tolerance:
+        if not work.open[j] and work.value[j] > tolerance:
             toggle(layout, work, j)
             changes += 1
     return changes
@@ -138,8 +122,8 @@ def release(layout, work, tolerance):  # type: ignore[no-untyped-def]
 def close_slacks(layout, work, tolerance):  # type: ignore[no-untyped-def]
     """Close negative slacks, and return their number."""
     changes = 0
-    for j in range(work.joints.shape[0]):
-        if work.joints[j, OPEN] and work.slacks[VALUE, j] < -CLOSED * tolerance:
+    for j in range(work.counts.size):
+        if work.open[j] and work.value[j] < -CLOSED * tolerance:
             toggle(layout, work, j)
             changes += 1
     return changes
@@ -149,11 +133,11 @@ def close_slacks(layout, work, tolerance):  # type: ignore[no-untyped-def]
 def scan(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
     """Write the most violated row of each joint, or -1, and its excess; return whether any row is violated."""
     violated = False
-    for j in range(work.joints.shape[0]):
+    for j in range(work.counts.size):
         depths[j], deepest[j] = -tolerance, -1
-        if layout.joints[j, SLACK] < 0:
+        if layout.slack[j] < 0:
             continue
-        for row in range(layout.joints[j, ROW], layout.joints[j + 1, ROW]):
+        for row in range(layout.row[j], layout.row[j + 1]):
             if work.position[row] < 0:
                 value = excess(layout, work, row)
                 if value < depths[j]:
@@ -168,8 +152,8 @@ def most_violated(work, tolerance, depths, deepest):  # type: ignore[no-untyped-
     for j in range(deepest.size):
         if depths[j] < lowest:
             lowest, target = depths[j], deepest[j]
-        if work.joints[j, OPEN] and work.slacks[VALUE, j] < min(lowest, -CLOSED * tolerance):
-            lowest, target = work.slacks[VALUE, j], work.position.size + j
+        if work.open[j] and work.value[j] < min(lowest, -CLOSED * tolerance):
+            lowest, target = work.value[j], work.position.size + j
     return target
 
 
@@ -179,37 +163,37 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
 
     The change is zero if the target is linearly dependent on the active rows.
     """
-    change, scatter, direction = work.positions[STEP], work.vectors[SCATTER], work.vectors[DIRECTION]
+    change, scatter, direction = work.step, work.scatter, work.direction
     is_row = target < work.position.size
-    joint = layout.rows[target, JOINT] if is_row else target - work.position.size
+    joint = layout.joint[target] if is_row else target - work.position.size
     opening, square = 1.0, 0.0
     if is_row:
         set_row(layout.blocks, work.slopes, target, 1.0, scatter)
-        opening = work.rows[target, OPENING]
+        opening = work.opening[target]
         square = squared_length(layout.blocks, work.slopes, target)
     for body in range(direction.shape[0]):
         for c in range(6):
             direction[body, c] = scatter[body, c]
-    for j in range(work.joints.shape[0]):
-        work.slacks[CHANGE, j] = opening if j == joint else 0.0
-        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+    for j in range(work.counts.size):
+        work.change[j] = opening if j == joint else 0.0
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             change[t] = product(layout.blocks, work.slopes, work.active[t], scatter)
-            if work.joints[j, OPEN] and j == joint:
-                change[t] += opening * work.rows[work.active[t], OPENING]
+            if work.open[j] and j == joint:
+                change[t] += opening * work.opening[work.active[t]]
     solve(layout, work, change)
-    for j in range(work.joints.shape[0]):
-        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+    for j in range(work.counts.size):
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
             add_row(layout.blocks, work.slopes, work.active[t], -change[t], direction)
-            work.slacks[CHANGE, j] -= work.rows[work.active[t], OPENING] * change[t]
-    rate = opening * work.slacks[CHANGE, joint] if work.joints[joint, OPEN] else 0.0
+            work.change[j] -= work.opening[work.active[t]] * change[t]
+    rate = opening * work.change[joint] if work.open[joint] else 0.0
     if is_row:
         rate += product(layout.blocks, work.slopes, target, direction)
         set_row(layout.blocks, work.slopes, target, 0.0, scatter)
     else:
         # If the slack closes, its rows have the relative pivot of the slack times the square of their openings.
         largest = 0.0
-        for t in range(layout.joints[joint, POSITION], layout.joints[joint, POSITION] + work.joints[joint, COUNT]):
-            largest = max(largest, work.rows[work.active[t], OPENING] ** 2)
+        for t in range(layout.first[joint], layout.first[joint] + work.counts[joint]):
+            largest = max(largest, work.opening[work.active[t]] ** 2)
         square = 1.0 / largest if largest > 0.0 else 0.0
     return rate if rate > dependence(work) * square else 0.0
 
@@ -218,36 +202,36 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
 def _block(layout, work):  # type: ignore[no-untyped-def]
     """Return the longest step that keeps multipliers nonnegative, and the row or slack that blocks it (see most_violated)."""
     step, blocking = np.inf, -1
-    for j in range(work.joints.shape[0]):
-        if layout.joints[j, SLACK] < 0:
+    for j in range(work.counts.size):
+        if layout.slack[j] < 0:
             continue
-        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            change = work.positions[STEP, t]
-            if change > RELIEVED and work.positions[MULTIPLIER, t] < step * change:
-                step, blocking = max(work.positions[MULTIPLIER, t], 0.0) / change, work.active[t]
-        change = work.slacks[CHANGE, j]
-        if not work.joints[j, OPEN] and change > RELIEVED and -work.slacks[VALUE, j] < step * change:
-            step, blocking = max(-work.slacks[VALUE, j], 0.0) / change, work.position.size + j
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
+            change = work.step[t]
+            if change > RELIEVED and work.multiplier[t] < step * change:
+                step, blocking = max(work.multiplier[t], 0.0) / change, work.active[t]
+        change = work.change[j]
+        if not work.open[j] and change > RELIEVED and -work.value[j] < step * change:
+            step, blocking = max(-work.value[j], 0.0) / change, work.position.size + j
     return step, blocking
 
 
 @inlined_inner
 def _advance(layout, work, length):  # type: ignore[no-untyped-def]
     """Take a step of this length in the direction of `_aim`."""
-    for body in range(work.vectors[Y].shape[0]):
+    for body in range(work.y.shape[0]):
         for c in range(6):
-            work.vectors[Y, body, c] += length * work.vectors[DIRECTION, body, c]
-    for j in range(work.joints.shape[0]):
-        work.slacks[VALUE, j] += length * work.slacks[CHANGE, j]
-        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            work.positions[MULTIPLIER, t] -= length * work.positions[STEP, t]
+            work.y[body, c] += length * work.direction[body, c]
+    for j in range(work.counts.size):
+        work.value[j] += length * work.change[j]
+        for t in range(layout.first[j], layout.first[j] + work.counts[j]):
+            work.multiplier[t] -= length * work.step[t]
 
 
 @inlined_inner
 def enter_joints(layout, work, deepest):  # type: ignore[no-untyped-def]
     """Activate the most violated row of each joint with a position left, unless a row of the joint has just left."""
     for j in range(deepest.size):
-        if deepest[j] >= 0 and not work.joints[j, CHANGED] and has_position(layout, work, j):
+        if deepest[j] >= 0 and not work.changed[j] and has_position(layout, work, j):
             append(layout, work, deepest[j])
 
 
@@ -259,7 +243,7 @@ def step_towards(layout, work, target, growth):  # type: ignore[no-untyped-def]
     """
     rows = work.position.size
     rate = _aim(layout, work, target)
-    gap = excess(layout, work, target) if target < rows else work.slacks[VALUE, target - rows]
+    gap = excess(layout, work, target) if target < rows else work.value[target - rows]
     step, blocking = _block(layout, work)
     whole = -gap / rate if rate > 0.0 else np.inf
     if min(step, whole) == np.inf:
@@ -268,10 +252,10 @@ def step_towards(layout, work, target, growth):  # type: ignore[no-untyped-def]
     growth += min(step, whole)
     if whole <= step:
         if target < rows:
-            if not has_position(layout, work, layout.rows[target, JOINT]):
+            if not has_position(layout, work, layout.joint[target]):
                 return STUCK, growth
             append(layout, work, target)
-            work.positions[MULTIPLIER, work.position[target]] = growth
+            work.multiplier[work.position[target]] = growth
         else:
             toggle(layout, work, target - rows)
         return ENTERED, growth

@@ -1,51 +1,59 @@
-"""Compiled factorization of the Gram matrix of the active rows, joint by joint.
+"""Compiled factorizations: of H = C C', and of the Gram matrix of the active rows, joint by joint.
+
+The block Cholesky factor C transforms a QP so that H is the identity: its rows become C^-1 a.
 
 Rows of length 1 have the Gram matrix N N'. For rows of a pair whose slack is open, the products of their openings are added.
-The Cholesky factor has entries only between joints that the elimination order connects (see layout).
+The Cholesky factor has entries only between joints that the elimination order connects (see graph_solver).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.compilation.graph.layout import JOINT, POSITION, PRIOR
-from tolcontact.compiled import inlined_inner
+from tolcontact.compiled import inlined_inner, inner
 
 # Relative pivots below which a row is dependent. Pivots of open slacks are squares of openings, which are tiny.
 DEPENDENT, DEPENDENT_IF_OPEN = 1e-11, 1e-14
 
 
-OPENING, BOUND = range(2)  # columns of Work.rows
-GRADIENT, Y, SCATTER, DIRECTION = range(4)  # of Work.vectors
-COUNT, FRESH, CHANGED, OPEN = range(4)  # columns of Work.joints
-PRICE, VALUE, CHANGE = range(3)  # of Work.slacks
-MULTIPLIER, STEP, COLUMN = range(3)  # of Work.positions
-
-
 class Work(NamedTuple):
-    """The numbers of one QP: min y'y/2 + gradient'y + sum (price s + s^2/2), slopes y + openings s >= bounds, s >= 0.
+    """The numbers of one QP: min y'y/2 + gradient'y + sum (price s + s^2/2), slopes y + opening s >= bound, s >= 0.
 
     slopes      (row, block, 6)
-    rows        (row, 2) openings and bounds
+    opening, bound  (row,)
     position    (row,) position of each active row, -1 for inactive rows
-    vectors     (4, body, 6) the gradient, the solution y, one row among zeros, the direction of y
-    joints      (joint, 4) number of active rows of the joint, which take its first positions; number of these rows with valid
-                entries of the factor; whether other entries have changed; whether the slack is open
-    slacks      (3, joint) price, value and direction; the value of a closed slack is the multiplier of its bound, times -1
+    gradient, y, scatter, direction  (body, 6): the gradient, the solution y, one row among zeros, the direction of y
+    counts      (joint,) number of active rows of the joint, which take its first positions
+    fresh       (joint,) number of these rows with valid entries of the factor
+    changed     (joint,) whether other entries have changed
+    open        (joint,) whether the slack is open
+    price, value, change  (joint,) price, value and direction of the slack; the value of a closed slack is the multiplier of its
+                bound, times -1
     factor      (position, position) the Cholesky factor: lower triangle with diagonal
     active      (position,) indices of the active rows
-    positions   (3, position) multipliers of the active rows, a step of the multipliers, the next row of the factor
+    multiplier, step, column  (position,): multipliers of the active rows, a step of the multipliers, the next row of the factor
     """
 
     slopes: np.ndarray
-    rows: np.ndarray
+    opening: np.ndarray
+    bound: np.ndarray
     position: np.ndarray
-    vectors: np.ndarray
-    joints: np.ndarray
-    slacks: np.ndarray
+    gradient: np.ndarray
+    y: np.ndarray
+    scatter: np.ndarray
+    direction: np.ndarray
+    counts: np.ndarray
+    fresh: np.ndarray
+    changed: np.ndarray
+    open: np.ndarray
+    price: np.ndarray
+    value: np.ndarray
+    change: np.ndarray
     factor: np.ndarray
     active: np.ndarray
-    positions: np.ndarray
+    multiplier: np.ndarray
+    step: np.ndarray
+    column: np.ndarray
 
 
 @inlined_inner
@@ -92,41 +100,41 @@ def set_row(blocks, slopes, row, weight, vectors):  # type: ignore[no-untyped-de
 @inlined_inner
 def has_position(layout, work, j):  # type: ignore[no-untyped-def]
     """Return whether one more row of joint j can be active. More rows than positions are dependent, up to rounding."""
-    return layout.joints[j, POSITION] + work.joints[j, COUNT] < layout.joints[j + 1, POSITION]
+    return layout.first[j] + work.counts[j] < layout.first[j + 1]
 
 
 @inlined_inner
 def append(layout, work, row):  # type: ignore[no-untyped-def]
     """Activate a row, after the other active rows of its joint, which must have a position left."""
-    j = layout.rows[row, JOINT]
-    position = layout.joints[j, POSITION] + work.joints[j, COUNT]
+    j = layout.joint[row]
+    position = layout.first[j] + work.counts[j]
     work.active[position], work.position[row] = row, position
-    work.positions[MULTIPLIER, position] = 0.0
-    work.joints[j, COUNT] += 1
+    work.multiplier[position] = 0.0
+    work.counts[j] += 1
 
 
 @inlined_inner
 def remove(layout, work, position):  # type: ignore[no-untyped-def]
     """Deactivate the row at a position."""
-    j = layout.rows[work.active[position], JOINT]
+    j = layout.joint[work.active[position]]
     work.position[work.active[position]] = -1
-    work.joints[j, COUNT] -= 1
-    for s in range(position, layout.joints[j, POSITION] + work.joints[j, COUNT]):
-        work.active[s], work.positions[MULTIPLIER, s] = work.active[s + 1], work.positions[MULTIPLIER, s + 1]
+    work.counts[j] -= 1
+    for s in range(position, layout.first[j] + work.counts[j]):
+        work.active[s], work.multiplier[s] = work.active[s + 1], work.multiplier[s + 1]
         work.position[work.active[s]] = s
-    work.joints[j, FRESH] = min(work.joints[j, FRESH], position - layout.joints[j, POSITION])
-    work.joints[j, CHANGED] = 1
+    work.fresh[j] = min(work.fresh[j], position - layout.first[j])
+    work.changed[j] = 1
 
 
 @inlined_inner
 def _eliminated(layout, work, j, position, value, solution):  # type: ignore[no-untyped-def]
     """Return a right side's value at a position of joint j, less the contributions of the solution (position,) before it."""
     factor = work.factor
-    for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
-        start = layout.joints[layout.prior[q, 0], POSITION]
-        for t in range(start, start + work.joints[layout.prior[q, 0], COUNT]):
+    for q in range(layout.prior_start[j], layout.prior_start[j + 1]):
+        start = layout.first[layout.prior[q, 0]]
+        for t in range(start, start + work.counts[layout.prior[q, 0]]):
             value -= factor[position, t] * solution[t]
-    for t in range(layout.joints[j, POSITION], position):
+    for t in range(layout.first[j], position):
         value -= factor[position, t] * solution[t]
     return value
 
@@ -134,27 +142,27 @@ def _eliminated(layout, work, j, position, value, solution):  # type: ignore[no-
 @inlined_inner
 def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untyped-def]
     """Compute the factor's row at a position of joint j, and return whether the row is independent of the rows before it."""
-    factor, column, active, scatter = work.factor, work.positions[COLUMN], work.active, work.vectors[SCATTER]
-    row, start = active[position], layout.joints[j, POSITION]
-    opening = work.rows[row, OPENING] if work.joints[j, OPEN] else 0.0
+    factor, column, active, scatter = work.factor, work.column, work.active, work.scatter
+    row, start = active[position], layout.first[j]
+    opening = work.opening[row] if work.open[j] else 0.0
     set_row(layout.blocks, work.slopes, row, 1.0, scatter)
     square = squared_length(layout.blocks, work.slopes, row) + opening * opening
     pivot = square
-    for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+    for q in range(layout.prior_start[j], layout.prior_start[j + 1]):
         k, adjacent = layout.prior[q, 0], layout.prior[q, 1]
-        for t in range(layout.joints[k, POSITION], layout.joints[k, POSITION] + work.joints[k, COUNT]):
+        for t in range(layout.first[k], layout.first[k] + work.counts[k]):
             value = product(layout.blocks, work.slopes, active[t], scatter) if adjacent else 0.0
             column[t] = _eliminated(layout, work, k, t, value, column) / factor[t, t]
             pivot -= column[t] * column[t]
     for t in range(start, position):
         value = product(layout.blocks, work.slopes, active[t], scatter)
-        if work.joints[j, OPEN]:
-            value += opening * work.rows[active[t], OPENING]
+        if work.open[j]:
+            value += opening * work.opening[active[t]]
         column[t] = _eliminated(layout, work, j, t, value, column) / factor[t, t]
         pivot -= column[t] * column[t]
-    for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+    for q in range(layout.prior_start[j], layout.prior_start[j + 1]):
         k = layout.prior[q, 0]
-        for t in range(layout.joints[k, POSITION], layout.joints[k, POSITION] + work.joints[k, COUNT]):
+        for t in range(layout.first[k], layout.first[k] + work.counts[k]):
             factor[position, t], column[t] = column[t], 0.0
     for t in range(start, position):
         factor[position, t], column[t] = column[t], 0.0
@@ -167,8 +175,8 @@ def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untype
 def any_open(work):  # type: ignore[no-untyped-def]
     """Return whether a slack is open."""
     is_open = False
-    for j in range(work.joints.shape[0]):
-        is_open = is_open or work.joints[j, OPEN] > 0
+    for j in range(work.counts.size):
+        is_open = is_open or work.open[j] > 0
     return is_open
 
 
@@ -182,21 +190,21 @@ def dependence(work):  # type: ignore[no-untyped-def]
 def factorize(layout, work):  # type: ignore[no-untyped-def]
     """Complete the factor, and return the number of rows that are dropped, since they depend on rows before them."""
     dropped, threshold = 0, dependence(work)
-    for j in range(work.joints.shape[0]):
-        for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
-            if work.joints[layout.prior[q, 0], CHANGED]:
-                work.joints[j, FRESH], work.joints[j, CHANGED] = 0, 1
-        if work.joints[j, FRESH] < work.joints[j, COUNT]:
-            work.joints[j, CHANGED] = 1
-        while work.joints[j, FRESH] < work.joints[j, COUNT]:
-            position = layout.joints[j, POSITION] + work.joints[j, FRESH]
+    for j in range(work.counts.size):
+        for q in range(layout.prior_start[j], layout.prior_start[j + 1]):
+            if work.changed[layout.prior[q, 0]]:
+                work.fresh[j], work.changed[j] = 0, 1
+        if work.fresh[j] < work.counts[j]:
+            work.changed[j] = 1
+        while work.fresh[j] < work.counts[j]:
+            position = layout.first[j] + work.fresh[j]
             if _factor_row(layout, work, j, position, threshold):
-                work.joints[j, FRESH] += 1
+                work.fresh[j] += 1
             else:
                 remove(layout, work, position)
                 dropped += 1
-    for j in range(work.joints.shape[0]):
-        work.joints[j, CHANGED] = 0
+    for j in range(work.counts.size):
+        work.changed[j] = 0
     return dropped
 
 
@@ -204,16 +212,134 @@ def factorize(layout, work):  # type: ignore[no-untyped-def]
 def solve(layout, work, values):  # type: ignore[no-untyped-def]
     """Solve with the Gram matrix of the active rows, in place; values (position,)."""
     factor = work.factor
-    for j in range(work.joints.shape[0]):
-        for position in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+    for j in range(work.counts.size):
+        for position in range(layout.first[j], layout.first[j] + work.counts[j]):
             values[position] = _eliminated(layout, work, j, position, values[position], values) / factor[position, position]
-    for j in range(work.joints.shape[0] - 1, -1, -1):
-        for position in range(layout.joints[j, POSITION] + work.joints[j, COUNT] - 1, layout.joints[j, POSITION] - 1, -1):
+    for j in range(work.counts.size - 1, -1, -1):
+        for position in range(layout.first[j] + work.counts[j] - 1, layout.first[j] - 1, -1):
             value = values[position] / factor[position, position]
             values[position] = value
-            for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
-                start = layout.joints[layout.prior[q, 0], POSITION]
-                for t in range(start, start + work.joints[layout.prior[q, 0], COUNT]):
+            for q in range(layout.prior_start[j], layout.prior_start[j + 1]):
+                start = layout.first[layout.prior[q, 0]]
+                for t in range(start, start + work.counts[layout.prior[q, 0]]):
                     values[t] -= factor[position, t] * value
-            for t in range(layout.joints[j, POSITION], position):
+            for t in range(layout.first[j], position):
                 values[t] -= factor[position, t] * value
+
+
+@inlined_inner
+def _cholesky(block):  # type: ignore[no-untyped-def]
+    """Replace a block (6, 6) by its Cholesky factor; return whether it is positive definite."""
+    for i in range(6):
+        for j in range(i + 1):
+            value = block[i, j]
+            for c in range(j):
+                value -= block[i, c] * block[j, c]
+            if j < i:
+                block[i, j] = value / block[j, j]
+            elif value > 0.0:
+                block[i, i] = np.sqrt(value)
+            else:
+                return False
+    return True
+
+
+@inlined_inner
+def _divide(block, triangle):  # type: ignore[no-untyped-def]
+    """Replace a block by its product with the inverse transpose of a lower triangle."""
+    for i in range(6):
+        for j in range(6):
+            value = block[i, j]
+            for c in range(j):
+                value -= block[i, c] * triangle[j, c]
+            block[i, j] = value / triangle[j, j]
+
+
+@inlined_inner
+def _subtract(block, left, right):  # type: ignore[no-untyped-def]
+    """Subtract left right' from a block."""
+    for i in range(6):
+        for j in range(6):
+            value = block[i, j]
+            for c in range(6):
+                value -= left[i, c] * right[j, c]
+            block[i, j] = value
+
+
+@inner
+def load_hessian(layout, nonzeros, k, blocks):  # type: ignore[no-untyped-def]
+    """Write the factor of problem k into `blocks`; return whether H is positive definite."""
+    blocks[:] = 0.0
+    for entry in range(layout.hessian_entries.size):
+        if layout.hessian_entries[entry] >= 0:
+            block, offset = divmod(layout.hessian_entries[entry], 36)
+            blocks[block, offset // 6, offset % 6] = nonzeros[k, entry]
+    starts, columns, block_of = layout.starts, layout.columns, layout.block_of
+    for body in range(starts.size - 1):
+        diagonal = starts[body + 1] - 1
+        for b in range(starts[body], diagonal):
+            column = columns[b]
+            for e in range(starts[body], b):
+                if block_of[column, columns[e]] >= 0:
+                    _subtract(blocks[b], blocks[e], blocks[block_of[column, columns[e]]])
+            _divide(blocks[b], blocks[starts[column + 1] - 1])
+            _subtract(blocks[diagonal], blocks[b], blocks[b])
+        if not _cholesky(blocks[diagonal]):
+            return False
+    return True
+
+
+@inlined_inner
+def _forward(triangle, vector):  # type: ignore[no-untyped-def]
+    """Solve with a lower triangle, in place."""
+    for i in range(6):
+        value = vector[i]
+        for c in range(i):
+            value -= triangle[i, c] * vector[c]
+        vector[i] = value / triangle[i, i]
+
+
+@inner
+def vectors_to_unit(layout, blocks, vectors):  # type: ignore[no-untyped-def]
+    """Multiply vectors (body, 6) by C^-1, in place."""
+    starts, columns = layout.starts, layout.columns
+    for body in range(starts.size - 1):
+        diagonal = starts[body + 1] - 1
+        for b in range(starts[body], diagonal):
+            for i in range(6):
+                for c in range(6):
+                    vectors[body, i] -= blocks[b, i, c] * vectors[columns[b], c]
+        _forward(blocks[diagonal], vectors[body])
+
+
+@inner
+def from_unit(layout, blocks, vectors):  # type: ignore[no-untyped-def]
+    """Multiply vectors (body, 6) by C'^-1, in place."""
+    starts, columns = layout.starts, layout.columns
+    for body in range(starts.size - 2, -1, -1):
+        diagonal = starts[body + 1] - 1
+        for i in range(5, -1, -1):
+            value = vectors[body, i]
+            for c in range(i + 1, 6):
+                value -= blocks[diagonal, c, i] * vectors[body, c]
+            vectors[body, i] = value / blocks[diagonal, i, i]
+        for b in range(starts[body], diagonal):
+            for i in range(6):
+                for c in range(6):
+                    vectors[columns[b], c] -= blocks[b, i, c] * vectors[body, i]
+
+
+@inner
+def rows_to_unit(layout, blocks, slopes):  # type: ignore[no-untyped-def]
+    """Multiply the slopes (row, block, 6) of all rows by C^-1, in place."""
+    starts = layout.starts
+    for row in range(slopes.shape[0]):
+        for q in range(layout.blocks[row, 0]):
+            body = layout.blocks[row, q + 1]
+            _forward(blocks[starts[body + 1] - 1], slopes[row, q])
+            for p in range(q + 1, layout.blocks[row, 0]):
+                b = layout.block_of[layout.blocks[row, p + 1], body]
+                if b >= 0:
+                    for i in range(6):
+                        for c in range(6):
+                            slopes[row, p, i] -= blocks[b, i, c] * slopes[row, q, c]

@@ -1,15 +1,16 @@
-"""The choice between fixed planes and bounded faces for each pair: a trial at raw poses when the model is compiled.
+"""Trials at raw poses when a model is compiled: they choose between fixed planes and bounded faces for each pair.
 
-It also decides how deep bodies may penetrate each other in an answer.
+They also decide how deep bodies may penetrate each other in an answer, and how accurate measures are.
 """
 
 import itertools
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
@@ -18,6 +19,7 @@ from tolcontact.discretization import ContactPoints, Nominal, raised_places
 from tolcontact.errors import ContactWarning, ModelError
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
 from tolcontact.interference import Watch, ordered
+from tolcontact.limits import GAP_ACCURACY
 from tolcontact.mechanics.groups import Group
 from tolcontact.method import Method
 from tolcontact.texts import shown
@@ -33,6 +35,9 @@ POSES_AT_ONCE = 64
 THREADS = 2  # that compare poses: the search for contact points releases the interpreter lock
 MIN_TRAVEL_SHARE = 1e-6  # of the size of the face
 PLANES_FACTOR = 3.0  # times the error that a trial allows: allowed penetration of faces on fixed planes
+MEASURE_TRIALS, MEASURE_SEED = 16, 2_718_281  # raw poses at which measures are differentiated
+STEP = 1e-5  # mm, rad: displacements of the differences
+LEVER_FACTOR = 2.0  # a gap error of 1 at the end of a contact span rotates the part by up to 2 / span
 
 
 class Trial(NamedTuple):
@@ -106,17 +111,16 @@ def _bounded_pair(
     tilt = float(pose.turn(X_RM, pose.AT_REST[None]).max())
     size = float(np.ptp(pair.moving_face.mesh.vertices, axis=0).max())
     bodies = nominal.parts[pair.moving].body, nominal.parts[pair.reference].body
+    depth = max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0)  # contact points suggest one for disjoint bodies, too
     reach = Reach(
         travel=TRAVEL_FACTOR * travel + pushed + MIN_TRAVEL_SHARE * size,
         tilt=tilt + pushed / size,
         spread=travel,
-        overlap=pair.coordinate_error + _overlap(watch, pair),
+        overlap=pair.coordinate_error + (depth if depth > 0 and watch.overlap(pair.moving, pair.reference) else 0.0),
         clearance=pair.clearance,
     )
     pair_meeting = meeting((pair.moving_face, pair.reference_face), bodies, reach, has_form=pair.has_form)
-    if pair_meeting is not None:
-        _check_corners(nominal, pair, pair_meeting)
-    else:
+    if pair_meeting is None:
         warnings.warn(
             f'contact pair "{shown(pair.name)}": its faces have too many edges to find contact where they end; '
             "use coarser meshes, or choose smaller faces",
@@ -124,18 +128,12 @@ def _bounded_pair(
             stacklevel=2,
         )
         return nothing
+    _check_corners(nominal, pair, pair_meeting)
     error = _error_of_planes(pair, pair_meeting, X_RM, deviations, room)
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
     represents_curves = FACET_FACTOR * bulge <= COARSE_SHARE * smallest
     allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if represents_curves else 0.0)
-    trial = Trial(error, allowed)
-    return (pair_meeting if trial.error > trial.allowed else None), trial
-
-
-def _overlap(watch: Watch, pair: ContactPoints) -> float:
-    """Return the nominal penetration [mm] of the bodies of a pair; 0 for disjoint bodies, whatever contact points suggest."""
-    depth = max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0)
-    return depth if depth > 0 and pair.reference is not None and watch.overlap(pair.moving, pair.reference) else 0.0
+    return (pair_meeting if error > allowed else None), Trial(error, allowed)
 
 
 def _check_corners(nominal: Nominal, pair: ContactPoints, pair_meeting: Meeting) -> None:
@@ -184,13 +182,52 @@ def allowed_depths(
             planes = PLANES_FACTOR * trials[k].allowed if is_fixed else 0.0
             rounding = 0.0 if k in meetings else pair.coordinate_error
             depths[bodies] = max(depths.get(bodies, 0.0), np.inf if pair.may_interfere else planes + rounding)
-    return depths | dict.fromkeys(_declared_overlaps(nominal), np.inf)
-
-
-def _declared_overlaps(nominal: Nominal) -> Iterator[tuple[int, int]]:
-    """Yield the pairs of bodies, of one station, that are declared to overlap."""
     for overlap in nominal.assembly.overlaps:
         indices = [index for index, part in enumerate(nominal.parts) if part.part in overlap.parts]
         for left, right in itertools.combinations(indices, 2):
             if nominal.parts[left].station == nominal.parts[right].station:
-                yield left, right
+                depths[left, right] = np.inf
+    return depths
+
+
+def measure_accuracies(
+    nominal: Nominal, groups: list[Group], draws: Draws, place: NamedFunction, observe: NamedFunction
+) -> Float[Array, " measure"]:
+    """Return the accuracy of each measure in its units: the accuracy of gaps, times the gain of the measure if that exceeds 1.
+
+    The gain is the error of a measure for an error of 1 mm in the gaps. Each free part is displaced, with the parts that are
+    located on it. Its contribution is the derivative of the measure by its translation, plus the derivative by its rotation
+    about the centre of its contact points times 2 / span. The largest value at some raw poses counts.
+    """
+    if not nominal.measures:
+        return np.zeros(0)
+    deviations = draws(seed=MEASURE_SEED, start=0, stop=MEASURE_TRIALS)
+    poses = place(deviations=deviations)["poses"]
+    initial = observe(poses=poses, deviations=deviations)["measured"]
+    initial[~np.isfinite(initial)] = np.nan  # a difference of infinities is a warning of NumPy
+    gains = np.zeros(len(nominal.measures))
+    for group in groups:
+        for mover, free in enumerate(group.free):
+            parts = [part for part, mobility in zip(group.parts, group.mobilities, strict=True) if mover in mobility.movers]
+            points = np.concatenate([
+                points
+                for pair in (nominal.pairs[k] for k in group.pairs)
+                for points, owner in ((pair.P_m, pair.moving), (pair.P_r, pair.reference))
+                if owner == free
+            ] or [nominal.parts[free].vertices])  # fmt: skip
+            nominal_centre = (points.min(axis=0) + points.max(axis=0)) / 2
+            span = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+            slopes = np.zeros((2, 3, len(initial), len(gains)))
+            for kind, axis in itertools.product(range(2), range(3)):
+                moved = poses.reshape(len(poses), -1, 12).copy()
+                centre = pose.apply(moved[:, free], nominal_centre[None])[:, 0]
+                direction = STEP * np.eye(3)[axis]
+                R = Rotation.from_rotvec(kind * direction).as_matrix()
+                shift = centre - centre @ R.T if kind else np.broadcast_to(direction, centre.shape)
+                displacement = pose.pose(np.broadcast_to(R, (len(centre), 3, 3)), shift)[:, None]
+                moved[:, parts] = pose.compose(displacement, moved[:, parts])
+                displaced = observe(poses=moved.reshape(poses.shape), deviations=deviations)["measured"]
+                slopes[kind, axis] = (displaced - initial) / STEP
+            sizes = np.sqrt((slopes**2).sum(axis=1))
+            gains += np.nan_to_num((sizes[0] + LEVER_FACTOR / span * sizes[1]), nan=0.0, posinf=0.0).max(axis=0)
+    return np.asarray(GAP_ACCURACY * np.maximum(gains, [1 / measure.unit for measure in nominal.measures]))
