@@ -48,7 +48,7 @@ LAZY = {
     "distributed": ("simulation/cluster.py",),
     "pandas": ("declaration/measured_table.py", "declaration/stack.py"),
     "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
-    "ngsolve": ("elasticity/cholesky.py",),  # an extra
+    "ngsolve": ("elasticity/meshed_body.py",),  # an extra
     "openpyxl": ("report/spreadsheet.py",),
     "psutil": ("system/",),  # where the system limits no process
     "ctypes": ("system/files.py",),  # for short names, on Windows

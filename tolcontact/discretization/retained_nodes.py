@@ -19,7 +19,7 @@ def retained_nodes(parts: Sequence[NominalPart], face: Surface) -> Float[Array, 
     for number, part in enumerate(parts):
         elastic = part.part.elasticity
         if elastic is not None and elastic.nodes is not None:
-            nodes = part.placed(node_table(Path(elastic.nodes)).positions)
+            nodes = part.placed(node_table(Path(elastic.nodes))[0])
             on_face, _, is_over = face.project(nodes)
             if number:
                 return np.asarray(on_face[is_over])

@@ -20,7 +20,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.declaration import Mesh, Part, Point
 from tolcontact.discretization import Nominal, NominalPart, Weld
-from tolcontact.elasticity import ElasticBody, MatrixSource, MeshSource, elastic_body, responses
+from tolcontact.elasticity import ElasticBody, imported_body, meshed_body, responses
 from tolcontact.errors import Faults, GeometryFault, designation
 from tolcontact.geometry.files import FROM_PRODUCT
 from tolcontact.mechanics.groups import Group, Load
@@ -151,21 +151,21 @@ class Bending:
 def elastic_bodies(nominal: Nominal) -> Bodies:
     """Return the bodies of the elastic parts. Raises ModelError, with a sentence for each part whose body cannot be made."""
     faults, parts = Faults(), {part.part: part for part in nominal.parts if part.part.elasticity is not None}
-    bodies = {part: faults.attempt(designation("part", part), elastic_body, _source(entry)) for part, entry in parts.items()}
+    bodies = {part: faults.attempt(designation("part", part), _body, entry) for part, entry in parts.items()}
     faults.refuse(nominal.assembly.name)
     return {part: body for part, body in bodies.items() if body is not None}
 
 
-def _source(entry: NominalPart) -> MeshSource | MatrixSource:
+def _body(entry: NominalPart) -> ElasticBody:
     elastic, mesh, geometry = entry.part.elasticity, entry.mesh, entry.part.geometry
     assert elastic is not None
     if elastic.stiffness is not None and elastic.nodes is not None:
-        return MatrixSource(Path(elastic.stiffness), Path(elastic.nodes), mesh.vertices, mesh.faces)
+        return imported_body(Path(elastic.stiffness), Path(elastic.nodes), mesh.vertices, mesh.faces)
     assert elastic.E is not None and elastic.nu is not None
     R, _ = mesh.metadata.get(FROM_PRODUCT, (np.eye(3), None))
     is_mirrored = np.linalg.det(R) < 0  # which is no solid of its file
     step = geometry.source if isinstance(geometry, Mesh) and geometry.is_step and not is_mirrored else None
-    return MeshSource(mesh.vertices, mesh.faces, elastic.E, elastic.nu, elastic.density, step, elastic.element_size)
+    return meshed_body(mesh.vertices, mesh.faces, elastic.E, elastic.nu, elastic.density, step, elastic.element_size)
 
 
 def with_weights(group: Group, nominal: Nominal, bodies: Bodies) -> Group:
