@@ -158,7 +158,7 @@ def test_imports_keep_to_the_walls():
 KINDS = {
     "RoundContact": {
         "discretization/__init__.py", "discretization/round_contact.py", "discretization/contact_points.py",
-        "mechanics/round_gap.py", "mechanics/pair_gaps.py",
+        "mechanics/round_gap.py",
     }
 }  # fmt: skip
 

@@ -15,14 +15,13 @@ import numpy as np
 from tolcontact.compilation.calls import Call
 from tolcontact.compilation.contact_rows import Rows, contact_rows, relative_poses
 from tolcontact.compilation.quadratic_terms import QuadraticTerms, quadratic_terms
-from tolcontact.mechanics.correction import FREEDOMS, Motion, linear
-from tolcontact.mechanics.displacement import MOMENTS
+from tolcontact.mechanics.correction import FREEDOMS, MOMENTS, Motion, linear
 from tolcontact.mechanics.gap import RowPoints
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.groups import Group
 from tolcontact.mechanics.objective import objective_scale
-from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.pose import Pose, poses_of
+from tolcontact.mechanics.round_gap import pair_gaps
 from tolcontact.method import Method
 
 MIN_MOVERS = 6  # smaller groups have Functions without calls

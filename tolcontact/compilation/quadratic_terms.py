@@ -10,8 +10,7 @@ from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS, Motion, linear, quadratic
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.objective import energy, proximity
-from tolcontact.mechanics.pose import Pose
-from tolcontact.mechanics.symmetric_products import congruent
+from tolcontact.mechanics.pose import Pose, congruent
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,3 +71,10 @@ def nearest_rotation(R: ca.SX, steps: int = 4) -> ca.SX:
 def relative(X_WM: Pose, X_WR: Pose) -> Pose:
     """Return X_RM, the pose of the moving part in the frame of the reference part."""
     return Pose(X_WR.R.T @ X_WM.R, X_WR.R.T @ (X_WM.t - X_WR.t))
+
+
+def congruent(B: ca.SX, A: ca.SX) -> ca.SX:
+    """Return A'BA (n, n) for a symmetric B (m, m) and A (m, n). The lower triangle is a copy of the upper one."""
+    product = B @ A
+    entries = ca.triu(ca.mtimes(A.sparsity().T, product.sparsity()))
+    return ca.triu2symm(ca.mac(A.T, product, ca.SX.zeros(entries)))
