@@ -15,9 +15,9 @@ from tolcontact.cli import app as common, output
 from tolcontact.cli.output import print_summary
 from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.errors import OptionError
+from tolcontact.replacing import temporary_folder
 from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
-from tolcontact.temporary import temporary_folder
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS, STACK_UP
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.models import DEFAULT_SOLVER

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tolcontact.declaration.checks import LENGTH, TRUTH, Checked, one_of
-from tolcontact.input_files import fault_of
+from tolcontact.tables import fault_of
 from tolcontact.texts import shown
 
 

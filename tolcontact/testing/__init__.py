@@ -26,7 +26,7 @@ from tolcontact.discretization import ContactPoints
 from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.method import Method
-from tolcontact.testing.archived_datums import tangents
+from tolcontact.testing.archived_faces import tangents
 from tolcontact.testing.referee import ArchivedPair, MissingVariableError, Rows
 from tolcontact.workflow import build
 

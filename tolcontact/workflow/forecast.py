@@ -9,8 +9,7 @@ from tolcontact.archive import bytes_of_rows, size_in_words
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import block_rows, simulate_blocks
-from tolcontact.system.machine import machine_memory
-from tolcontact.system.resources import peak_memory
+from tolcontact.system.machine import machine_memory, peak_memory
 from tolcontact.vocabulary import BLOCK_ROWS
 
 log = logging.getLogger(__name__)

@@ -15,13 +15,12 @@ from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_archive,
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError, check_choice
 from tolcontact.method import Solver
-from tolcontact.replacing import check_identities
+from tolcontact.replacing import check_identities, temporary_folder
 from tolcontact.simulation import block_rows, other_objectives
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses, warn_of
 from tolcontact.statistics import STATISTICS, estimate_of
 from tolcontact.statistics.measure_statistics import HALF_WIDTH, StatisticRequest
-from tolcontact.temporary import temporary_folder
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, OBJECTIVES_GROUP, OUTSIDE, PLANS, PPM, FieldChoice, Kept, Plan
 from tolcontact.workflow.accessor import Results
 from tolcontact.workflow.forecast import announce
