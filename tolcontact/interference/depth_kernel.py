@@ -163,6 +163,16 @@ def _nearest(side, p, enough):  # type: ignore[no-untyped-def]
     return math.sqrt(square), best, foot
 
 
+@inlined_uncounted
+def _write(k, X, is_forward, depth, own, triangle, place, foot, depths, triangles, places):  # type: ignore[no-untyped-def]
+    """Write the depth of realization k at a place on a triangle (or edge) of one body, whose foot is on one of the other."""
+    depths[k] = depth
+    place_A, place_B = (place, foot) if is_forward else (move(X, foot), move(X, place))
+    triangles[k, 0], triangles[k, 1] = (own, triangle) if is_forward else (triangle, own)
+    for i in range(3):
+        places[k, 0, i], places[k, 1, i] = place_A[i], place_B[i]
+
+
 @uncounted
 def _sound(target, k, X, is_forward, p, q, edge, depths, triangles, places):  # type: ignore[no-untyped-def]
     """Raise the depth of realization k to the depth of the edge segment from p to q, which lies in the other body."""
@@ -170,11 +180,7 @@ def _sound(target, k, X, is_forward, p, q, edge, depths, triangles, places):  # 
         place = along(p, j / SAMPLES, minus(q, p))
         depth, triangle, foot = _nearest(target, place, depths[k])
         if depth > depths[k]:
-            depths[k] = depth
-            place_A, place_B = (place, foot) if is_forward else (move(X, foot), move(X, place))
-            triangles[k, 0], triangles[k, 1] = (-1 - edge, triangle) if is_forward else (triangle, -1 - edge)
-            for i in range(3):
-                places[k, 0, i], places[k, 1, i] = place_A[i], place_B[i]
+            _write(k, X, is_forward, depth, -1 - edge, triangle, place, foot, depths, triangles, places)
 
 
 @uncounted
@@ -223,11 +229,7 @@ def _sound_centres(owner, target, k, X, is_forward, shares, senses, depths, tria
             continue
         depth, triangle, foot = _nearest(target, p, depths[k])
         if depth > depths[k] and is_within(target, p):
-            depths[k] = depth
-            place_A, place_B = (p, foot) if is_forward else (move(X, foot), move(X, p))
-            triangles[k, 0], triangles[k, 1] = (t, triangle) if is_forward else (triangle, t)
-            for i in range(3):
-                places[k, 0, i], places[k, 1, i] = place_A[i], place_B[i]
+            _write(k, X, is_forward, depth, t, triangle, p, foot, depths, triangles, places)
 
 
 @compiled

@@ -79,13 +79,13 @@ class Flexibility:
 
     def openings(self, reactions: Float[Array, "realization row"]) -> Float[Array, "realization row"]:
         """Return the openings (realization, row) [mm] under reactions [N] of the rows, summed up in a fixed order."""
-        openings = np.tile(self.opening, (len(reactions), 1))
-        _add_openings(self.C, np.ascontiguousarray(reactions), openings)
-        return openings
+        return self._opened(np.tile(self.opening, (len(reactions), 1)), reactions)
 
     def bent(self, reactions: Float[Array, "realization row"]) -> Float[Array, "realization row"]:
         """Return C l (realization, row) [mm]: the openings by reactions [N] of the rows, without constant forces."""
-        openings = np.zeros(reactions.shape)
+        return self._opened(np.zeros(reactions.shape), reactions)
+
+    def _opened(self, openings: np.ndarray, reactions: np.ndarray) -> np.ndarray:
         _add_openings(self.C, np.ascontiguousarray(reactions), openings)
         return openings
 

@@ -36,20 +36,8 @@ from tolcontact.mechanics.pose import ENTRIES, Pose, relative
 from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.user_functions import FunctionError, called
 
-UNARY_FUNCTIONS: dict[str, Callable[[Any], Any]] = {
-    "neg": lambda a: -a, "exp": ca.exp, "log": ca.log, "sqrt": ca.sqrt, "sq": lambda a: a * a, "twice": lambda a: 2 * a,
-    "sin": ca.sin, "cos": ca.cos, "tan": ca.tan, "asin": ca.asin, "acos": ca.acos, "atan": ca.atan, "floor": ca.floor,
-    "ceil": ca.ceil, "fabs": ca.fabs, "sign": ca.sign, "erf": ca.erf, "inv": lambda a: 1 / a, "sinh": ca.sinh,
-    "cosh": ca.cosh, "tanh": ca.tanh, "asinh": ca.asinh, "acosh": ca.acosh, "atanh": ca.atanh, "not": ca.logic_not,
-    "log1p": ca.log1p, "expm1": ca.expm1, "assign": lambda a: a,
-}  # fmt: skip
-BINARY_FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
-    "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
-    "pow": ca.power, "constpow": ca.power, "lt": ca.lt, "le": ca.le, "eq": ca.eq, "ne": ca.ne, "and": ca.logic_and,
-    "or": ca.logic_or, "fmod": ca.fmod, "remainder": ca.remainder, "copysign": ca.copysign, "atan2": ca.atan2,
-    "fmin": ca.fmin, "fmax": ca.fmax, "hypot": ca.hypot, "if_else_zero": lambda a, b: ca.if_else(a, b, 0),
-}  # fmt: skip
-_NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in (*UNARY, *BINARY)}
+OPERATIONS: dict[str, int] = {name: getattr(ca, f"OP_{name.upper()}") for name in (*UNARY, *BINARY)}  # of tapes, in CasADi
+_NAMES = {operation: name for name, operation in OPERATIONS.items()}
 
 
 def record(expression: ca.SX, entries: ca.SX, max_steps: int = MAX_STEPS) -> Tape:
@@ -93,10 +81,9 @@ def replay(tape: Tape, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
             values.append(entries[operands[0]])
         elif operation == "const":
             values.append(ca.SX(operands[0]))
-        elif operation in UNARY_FUNCTIONS:
-            values.append(UNARY_FUNCTIONS[operation](values[operands[0]]))
         else:
-            values.append(BINARY_FUNCTIONS[operation](values[operands[0]], values[operands[1]]))
+            apply = ca.SX.unary if operation in UNARY else ca.SX.binary
+            values.append(apply(OPERATIONS[operation], *(values[operand] for operand in operands)))
     return values[-1]
 
 
