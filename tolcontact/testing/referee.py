@@ -24,10 +24,6 @@ GOLDEN = (np.sqrt(5) - 1) / 2
 Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
 
 
-class MissingVariableError(LookupError):
-    """An error for an archive without a variable that the computation of gaps needs."""
-
-
 def archived_points(contact: Mapping[str, np.ndarray], points: np.ndarray) -> "list[ArchivedPoint]":
     """Return the contact points that belong to round faces, out of the indices `points` (point,).
 
@@ -192,7 +188,7 @@ class ArchivedPair:
     def gaps(self, rows: Rows, piece: slice) -> np.ndarray:
         """Return the gaps (realization, state, point) [mm] of a piece of the realizations; parts bend in corrected states only.
 
-        Raises MissingVariableError, with the name of a required variable that the archive does not have.
+        Raises AssertionError, with the name of a required variable that the archive does not have.
         """
         gaps = self._rigid_gaps(rows, piece)
         if self.bending is not None and self.bending.loads.size:
@@ -295,5 +291,5 @@ def _pose(rows: Rows, piece: slice, part: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _needed(rows: Rows, name: str, piece: slice) -> np.ndarray:
     if name not in rows:
-        raise MissingVariableError(f'"{name}"')
+        raise AssertionError(f'gaps cannot be computed again without "{name}", which was not kept: tc.run(..., keep="all")')
     return np.asarray(rows[name][piece].values)
