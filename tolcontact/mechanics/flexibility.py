@@ -36,7 +36,8 @@ Bodies = Mapping[Part, ElasticBody]
 def _add_openings(C, reactions, openings):  # type: ignore[no-untyped-def]
     """Add C l to the openings (realization, row) [mm], with C (row, row) [mm/N], for reactions l (realization, row) [N].
 
-    Sums run over the rows under load in their order, so that a realization does not depend on the others.
+    Sums run over the rows under load in their order, so that a realization does not depend on the others. The function calls
+    no other compiled one, so that Numba notices every change (see tolcontact.compiled).
     """
     for k in range(len(reactions)):
         for row in range(len(C)):
