@@ -10,16 +10,11 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.helpers import compiled
-from tolcontact.interference import Neighbours, deviating_solid, solid
+from tolcontact.interference import Neighbours, solid
 from tolcontact.poses import AT_REST
 
 INSETS = (1e-4, 2e-4)
 BOX = ((0, 0, 0), (10, 10, 10))
-
-
-def body(mesh):
-    closed = solid(mesh)
-    return deviating_solid(closed, [], np.zeros(len(closed.faces)))
 
 
 def box(lower, upper):
@@ -31,7 +26,7 @@ def pose(shift=(0, 0, 0), turn=(0, 0, 0)):
 
 
 def neighbours(A, B, reach=1.0):
-    return Neighbours(body(A), body(B), INSETS, reach)
+    return Neighbours(solid(A), solid(B), INSETS, reach)
 
 
 def common_ball(A, B, X):
@@ -127,7 +122,7 @@ def test_vertices_stay_on_planes_that_deviate():
     side = np.flatnonzero(closed.normals[:, 0] > 0.5)
     motions = [closed.normals[triangles][:, None, :, None].repeat(3, axis=1) for triangles in (top, side)]
     faces = [(top, np.array([0]), motions[0]), (side, np.array([2]), motions[1])]
-    vertices, motions = deviating_solid(closed, faces, np.zeros(12)).motions
+    vertices, motions = closed.deviating(faces, closed.bulges).motions
     expected = np.zeros((8, 3))
     expected[closed.vertices[:, 2] > 5, 2], expected[closed.vertices[:, 0] > 5, 0] = 0.3, -0.2
     moved = np.zeros((8, 3))
@@ -142,7 +137,7 @@ def test_a_bore_that_shifts_keeps_its_shape_with_any_number_of_facets(sections):
     bore = np.flatnonzero((radii[closed.faces] < 4).all(axis=1))
     shift = np.eye(3)[:, :2]
     faces = [(bore, np.array([0, 1]), np.broadcast_to(shift, (len(bore), 3, 3, 2)))]
-    vertices, motions = deviating_solid(closed, faces, np.zeros(len(closed.faces))).motions
+    vertices, motions = closed.deviating(faces, closed.bulges).motions
     assert set(vertices) == set(np.flatnonzero(radii < 4))
     np.testing.assert_allclose(motions, np.broadcast_to(shift, motions.shape), atol=1e-9)
 
@@ -191,8 +186,8 @@ def test_blocks_that_touch_are_one_closed_body(at):
     touching = solid(both)
     assert touching is not None and len(touching.components) == 2 and len(touching.edges) == 24
     X = np.array([pose((-4, 0, 0)), pose((-3, 0, 0)), pose((12, 12, 2))])  # beside a block, touching it, in another one's place
-    cube = body(box((0, 0, 0), (3, 3, 3)))
-    found = Neighbours(cube, deviating_solid(touching, [], np.zeros(len(touching.faces))), INSETS, 1.0).interfere(X)
+    cube = solid(box((0, 0, 0), (3, 3, 3)))
+    found = Neighbours(cube, touching, INSETS, 1.0).interfere(X)
     assert found.tolist() == [False, False, at == (10, 10, 0)]
 
 
@@ -202,7 +197,7 @@ def test_planes_that_oppose_each_other_all_move_inwards(heights):
     at, depth, size = [(-3, -3), (0, -3), (0, 0), (-3, 0)], 0.25, 12
     blocks = [box((x, y, -2), (x + 3, y + 3, height)) for (x, y), height in zip(at, heights, strict=True)]
     whole = solid(trimesh.boolean.union(blocks, engine="manifold"))
-    shifts = whole.inset(np.full(len(whole.faces), depth))
+    shifts = whole.inset(depth).vertices - whole.vertices
     heights_of_corners = (shifts[whole.faces] * whole.normals[:, None]).sum(axis=2)
     np.testing.assert_allclose(heights_of_corners, -depth, rtol=1e-9)
     cells = np.zeros((2 * size, 2 * size, 4 * size), dtype=bool)  # of the width `depth`

@@ -290,10 +290,10 @@ def test_workers_ignore_an_interrupt_where_they_cannot_inherit_that_it_is_blocke
 
 WATCH = """
 import sys
-from tolcontact.system import watch
+from tolcontact.system import processes
 waste = {"time": "while True: pass", "memory": "x = bytearray(10**9); import time; time.sleep(60)", "": "print(1)"}
 for limit, code in waste.items():
-    _, output, _, found = watch.run([sys.executable, "-c", code], memory=3 * 10**8, seconds=20 if limit == "" else 1)
+    _, output, _, found = processes.run([sys.executable, "-c", code], memory=3 * 10**8, seconds=20 if limit == "" else 1)
     print(found == limit, output)
 """
 
@@ -304,7 +304,7 @@ def test_a_process_that_no_system_limits_is_ended_by_its_parent():
 
 @pytest.mark.parametrize(("system", "unit"), [("darwin", 1), ("linux", 1024)])
 def test_peak_memory_is_in_bytes_on_every_system(system, unit):
-    code = f"import resource, sys; sys.platform = {system!r}\nfrom tolcontact.system.resources import peak_memory\n"
+    code = f"import resource, sys; sys.platform = {system!r}\nfrom tolcontact.system.machine import peak_memory\n"
     code += f"peak = {unit} * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\nprint(peak <= peak_memory() < 2 * peak)"
     assert run([sys.executable, "-c", code]).stdout == "True\n"
 

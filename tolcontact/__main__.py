@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from tolcontact import cli, interrupts
-from tolcontact.system import machine, streams
-from tolcontact.system.resources import address_space
+from tolcontact.system import files, machine
 
 MIN_ADDRESS_SPACE = 1_500_000_000  # bytes
 MIN_GARBAGE = 200_000  # objects: modules hold no garbage, and looking for it takes a fifth of the time of all imports
@@ -18,7 +17,7 @@ def command_line() -> None:
     """Run the command line (see tolcontact.cli)."""
     try:
         with interrupts.stoppable(at_once=True):
-            streams.open_closed()
+            files.open_closed()
             check_address_space()
             check_threads()
             # Linear algebra has one thread: starting more takes longer than a run, and blocks have threads of their own.
@@ -39,7 +38,7 @@ def _imported() -> Callable[[], None]:
 
 def check_address_space() -> None:
     """Exit with code 2 unless libraries can be loaded: with less address space some of them hang instead of failing."""
-    limit = address_space()
+    limit = machine.address_space()
     if limit is not None and limit < MIN_ADDRESS_SPACE:
         needed = f"{MIN_ADDRESS_SPACE / 1e9:g} GB"
         _refuse(f"this process may use {limit / 1e9:g} GB of address space, and its libraries need {needed}; raise ulimit -v")

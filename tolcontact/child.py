@@ -4,9 +4,8 @@ import os
 import sys
 from pathlib import Path
 
-from tolcontact.system import watch
-from tolcontact.system.exit_codes import TIME_LIMIT, crash
-from tolcontact.system.resources import limit_resources
+from tolcontact.system.machine import limit_resources
+from tolcontact.system.processes import TIME_LIMIT, crash, run
 
 __all__ = ["TIME_LIMIT", "ChildDiedError", "Refusal", "crash", "environment", "limit_resources", "run_child"]
 
@@ -25,7 +24,7 @@ def run_child(script: Path, argument: str, *, memory: int, seconds: int) -> str:
     Raises ChildDiedError if it is ended at a limit, or ends by a signal or an error.
     """
     command = [sys.executable, "-P", os.fspath(script), argument, str(memory), str(seconds)]
-    code, output, errors, limit = watch.run(command, memory=memory, seconds=seconds, env=environment())
+    code, output, errors, limit = run(command, memory=memory, seconds=seconds, env=environment())
     if code or limit:
         raise ChildDiedError(_reason(code, errors, limit))
     return output.decode("utf-8", "surrogateescape")

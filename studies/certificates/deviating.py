@@ -80,7 +80,7 @@ def deviated(bodies: list[Body], program: tc.Program, deviations: np.ndarray) ->
         solid = program.watch.solid(number)
         assert solid is not None
         moved, motions = solid.motions
-        corners, motion = solid.solid.vertices[moved], motions @ deviations[solid.columns]
+        corners, motion = solid.vertices[moved], motions @ deviations[solid.columns]
         halfspaces = np.column_stack([piece.normals, -piece.offsets])
         for k, n in enumerate(piece.normals):
             of_face = np.abs(corners @ n - piece.offsets[k]) < ON_PLANE

@@ -37,7 +37,7 @@ WELDED = HERE.parents[1] / "models" / "welded_sheets.py"
 def box(size: Sequence[float], nu: float, h: float | None) -> elasticity.ElasticBody:
     """Return the elastic body of a box with a corner at the origin."""
     mesh = trimesh.creation.box(bounds=[(0, 0, 0), size])
-    return elasticity.elastic_body(elasticity.MeshSource(mesh.vertices, mesh.faces, E, nu, DENSITY, element_size=h))
+    return elasticity.meshed_body(mesh.vertices, mesh.faces, E, nu, DENSITY, element_size=h)
 
 
 def opening(body: elasticity.ElasticBody, points: np.ndarray, weights: np.ndarray, radius: float) -> float:
@@ -81,7 +81,7 @@ def clamped(h: float, length: float, width: float = 20.0) -> float:
 def clamped_disc(h: float, radius: float = 15.0, nu: float = 0.3) -> float:
     """Return the deflection of a round sheet of 1 mm under its weight, its rim held, by Mindlin's theory."""
     mesh = trimesh.creation.cylinder(radius, 1.0, sections=96)
-    body = elasticity.elastic_body(elasticity.MeshSource(mesh.vertices, mesh.faces, E, nu, DENSITY, element_size=h))
+    body = elasticity.meshed_body(mesh.vertices, mesh.faces, E, nu, DENSITY, element_size=h)
     from_centre = np.hypot(*body.nodes[:, :2].T)
     u = sagged(body, np.flatnonzero(from_centre > np.cos(np.pi / 96) * radius - 1e-6))
     q, rigidity, shear = DENSITY * 1e-9 * GRAVITY, E / 12 / (1 - nu**2), 5 / 6 * E / 2 / (1 + nu)

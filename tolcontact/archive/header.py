@@ -19,7 +19,7 @@ from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry import known_surfaces, surface_arrays
 from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, coordinate_spacing
-from tolcontact.mechanics.displacement import central_moments
+from tolcontact.mechanics.correction import central_moments
 from tolcontact.simulation.bodies import locator_variations
 from tolcontact.simulation.run_checks import compared_objectives, empty_by_objective
 from tolcontact.vocabulary import ArchiveVariable

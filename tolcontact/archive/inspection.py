@@ -19,9 +19,9 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.child import ChildDiedError, run_child
 from tolcontact.errors import ArchiveError
-from tolcontact.input_files import fault_of
 from tolcontact.system import files
-from tolcontact.system.resources import limit_resources
+from tolcontact.system.machine import limit_resources
+from tolcontact.tables import fault_of
 from tolcontact.texts import CONTROL_CHARACTERS, shown
 from tolcontact.vocabulary import ArchiveVariable, archive, variation
 

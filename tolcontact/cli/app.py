@@ -19,7 +19,7 @@ from tolcontact import cli, interrupts, shape_worker
 from tolcontact.cli import analyses
 from tolcontact.errors import OptionError, TolcontactError
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
-from tolcontact.system import streams
+from tolcontact.system import files
 from tolcontact.texts import shown
 from tolcontact.version import __version__
 
@@ -188,7 +188,7 @@ def main(assembly: "Callable[[], Assembly]") -> None:
 
 def command_line(arguments: list[str] | None = None) -> None:
     """Run `app` as the console script; an error prints one message and gives exit code 2."""
-    streams.escape_unprintable()
+    files.escape_unprintable()
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning

@@ -18,10 +18,10 @@ from tolcontact.cli.output import print_summary, shown_progress, stopped
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
+from tolcontact.replacing import temporary_folder
 from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
 from tolcontact.system import files
-from tolcontact.temporary import temporary_folder
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS, STACK_UP
 from tolcontact.workflow.accessor import summarize
 from tolcontact.workflow.comparison import compare as compare_solvers, compare_runs, named_archives

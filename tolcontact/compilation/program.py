@@ -35,10 +35,10 @@ from tolcontact.mechanics.flexibility import (
 from tolcontact.mechanics.group_equations import face_poses, facing_pose
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
-from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.placement import raw_poses
 from tolcontact.mechanics.pose import ENTRIES, poses_of
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
+from tolcontact.mechanics.round_gap import pair_gaps
 from tolcontact.method import Method
 from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured

@@ -116,7 +116,7 @@ def _retained_nodes(parts: Sequence[NominalPart], face: Surface) -> np.ndarray |
     for number, part in enumerate(parts):
         elastic = part.part.elasticity
         if elastic is not None and elastic.nodes is not None:
-            nodes = part.placed(node_table(Path(elastic.nodes)).positions)
+            nodes = part.placed(node_table(Path(elastic.nodes))[0])
             on_face, _, is_over = face.project(nodes)
             return on_face[is_over] if number else nodes[np.linalg.norm(nodes - on_face, axis=1) <= MAX_OFFSET]
     return None

@@ -3,10 +3,8 @@
 .. include:: ../guide/elasticity.md
 """
 
-from tolcontact.elasticity.bodies import elastic_body
 from tolcontact.elasticity.elastic_body import ElasticBody, flexibility, responses
-from tolcontact.elasticity.imported_body import MAX_OFFSET
-from tolcontact.elasticity.node_table import node_table
-from tolcontact.elasticity.sources import MatrixSource, MeshSource
+from tolcontact.elasticity.imported_body import MAX_OFFSET, imported_body, node_table
+from tolcontact.elasticity.meshed_body import meshed_body
 
-__all__ = ["MAX_OFFSET", "ElasticBody", "MatrixSource", "MeshSource", "elastic_body", "flexibility", "node_table", "responses"]
+__all__ = ["MAX_OFFSET", "ElasticBody", "flexibility", "imported_body", "meshed_body", "node_table", "responses"]

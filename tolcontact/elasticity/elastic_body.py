@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import scipy
@@ -19,12 +18,7 @@ BLOCK_LOADS = 64  # solved at a time: the displacements of one block are in memo
 FEW_NODES, NEIGHBOURS = 200, 16  # up to this number, displacements are interpolated between all nodes; else between the nearest
 
 
-class Pads(Protocol):
-    """How unit forces act on the nodes of a body."""
-
-    def __call__(
-        self, points: Float[Array, "load 3"], directions: Float[Array, "load 3"], radius: float | None
-    ) -> sparse.csc_array: ...
+Pads = Callable[[np.ndarray, np.ndarray, float | None], sparse.csc_array]  # see ElasticBody.spread
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,11 +3,10 @@
 .. include:: ../guide/interference.md
 """
 
-from tolcontact.interference.deviating_solid import DeviatingSolid, deviating_solid
 from tolcontact.interference.neighbours import Interference, Neighbours, WayOut
 from tolcontact.interference.solid import Solid, solid
 from tolcontact.interference.watch import Clash, Watch, ordered
 
 __all__ = [
-    "Clash", "DeviatingSolid", "Interference", "Neighbours", "Solid", "Watch", "WayOut", "deviating_solid", "ordered", "solid",
+    "Clash", "Interference", "Neighbours", "Solid", "Watch", "WayOut", "ordered", "solid",
 ]  # fmt: skip

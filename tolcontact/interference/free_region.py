@@ -24,36 +24,17 @@ from typing import NamedTuple
 import igl
 import numpy as np
 
-from tolcontact.arrays import Array, Bool, Float
+from tolcontact.arrays import Array, Float
 from tolcontact.geometry.analytic_surfaces import Cylinder
-from tolcontact.interference.deviating_solid import DeviatingSolid
 from tolcontact.interference.free_kernel import Region
 from tolcontact.interference.kernel import ROUNDED
+from tolcontact.interference.solid import Solid
 
 MAX_HALF_SPACES = 64  # that are considered, from the largest facets
 MAX_CORES = 16
 MAX_CONSTRAINTS = 4
 SAME_DIRECTION = 1e-6  # rad; for the radii at the ends of a slot, their relative difference
 CORNERS = np.array(np.meshgrid(*[(0, 1)] * 3)).reshape(3, -1).T
-
-
-class InsetBody(NamedTuple):
-    """A body and its vertices (v, 3) [mm], which lie a little inside."""
-
-    body: DeviatingSolid
-    vertices: Float[Array, "v 3"]
-
-    @property
-    def corners(self) -> Float[Array, "t 3 3"]:
-        """The corners of the triangles [mm]."""
-        return self.vertices[self.body.solid.faces]
-
-    def slopes(self, directions: Float[Array, "t 3"], triangles: Bool[Array, " t"]) -> Float[Array, "m 3 k"]:
-        """Return how far unit deviations move the corners of some triangles along the direction of each."""
-        moved, motions = self.body.motions
-        of_vertices = np.zeros((len(self.vertices), 3, len(self.body.columns)))
-        of_vertices[moved] = motions
-        return np.einsum("mi,mcik->mck", directions[triangles], of_vertices[self.body.solid.faces[triangles]])
 
 
 class Constraint(NamedTuple):
@@ -81,8 +62,11 @@ class Constraint(NamedTuple):
         return np.asarray(np.where(np.isfinite(heights), heights, -np.inf) - self.values.max())
 
 
-def free_region(outer: InsetBody, inner: InsetBody, *, is_forward: bool) -> Region | None:
-    """Return a region that nominally contains the inner body and that the outer one does not reach; None if there is none."""
+def free_region(outer: Solid, inner: Solid, *, is_forward: bool) -> Region | None:
+    """Return a region that nominally contains the inner body and that the outer one does not reach; None if there is none.
+
+    The vertices of both bodies lie a little inside their surfaces.
+    """
     size = float(max(np.abs(outer.vertices).max(), np.abs(inner.vertices).max()))
     corners, least = outer.corners, 2 * ROUNDED * size
     candidates = [*_half_spaces(outer, inner), *_hollows(outer, inner)]
@@ -98,14 +82,14 @@ def free_region(outer: InsetBody, inner: InsetBody, *, is_forward: bool) -> Regi
             clearances[[k for k in range(len(candidates)) if k != best and candidates[k].core is not None]] = -np.inf
         chosen.append(best)
         is_left &= ~(clearances[best] > least)
-    turns = igl.winding_number(outer.vertices, outer.body.solid.faces, np.ascontiguousarray(inner.vertices[:1]))
+    turns = igl.winding_number(outer.vertices, outer.faces, np.ascontiguousarray(inner.vertices[:1]))
     if float(np.atleast_1d(turns)[0]) > 0.5:
         return None
     return _region(outer, inner, [candidates[k] for k in chosen], clearances[chosen].argmax(axis=0), size, is_forward)
 
 
 def _region(
-    outer: InsetBody, inner: InsetBody, constraints: Sequence[Constraint], owner: np.ndarray, size: float, is_forward: bool
+    outer: Solid, inner: Solid, constraints: Sequence[Constraint], owner: np.ndarray, size: float, is_forward: bool
 ) -> Region:
     """Return the region of some constraints; `owner` (t,) assigns one of them to each triangle of the outer body."""
     order = sorted(range(len(constraints)), key=lambda k: constraints[k].core is not None)
@@ -115,11 +99,11 @@ def _region(
     core = next((constraint.core for constraint in constraints if constraint.core is not None), None)
     if core is None:
         core = np.zeros((3, 3))
-        groups.append((np.zeros(0), np.zeros((0, len(outer.body.columns)))))
+        groups.append((np.zeros(0), np.zeros((0, len(outer.columns)))))
         levels.append(np.inf)
     slopes = np.concatenate([slopes for _, slopes in groups])
     slacks = np.min([levels[place] - constraints[k].values for place, k in enumerate(order)], axis=0)
-    moved, motions = inner.body.motions
+    moved, motions = inner.motions
     fixed = np.setdiff1d(np.argsort(slacks, kind="stable"), moved, assume_unique=True)
     return Region(
         normals=np.array(half_spaces).reshape(-1, 3),
@@ -140,14 +124,15 @@ def _region(
     )
 
 
-def _bounds(outer: InsetBody, constraint: Constraint, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(outer: Solid, constraint: Constraint, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return bounds (g,) [mm] and slopes (g, k) of the level of a constraint from its assigned triangles.
 
     Corners whose slopes agree but for rounding, most corners of a face that varies in size, share a bound.
     """
     corners = outer.corners[triangles]
     heights = np.einsum("mi,mci->mc", constraint.directions[triangles], corners) - constraint.offsets[triangles, None]
-    slopes = outer.slopes(constraint.directions, triangles).reshape(heights.size, len(outer.body.columns))
+    motions = outer.motions_of_vertices[outer.faces[triangles]]
+    slopes = np.einsum("mi,mcik->mck", constraint.directions[triangles], motions).reshape(heights.size, len(outer.columns))
     unit = ROUNDED * np.maximum(np.abs(slopes).max(axis=0, initial=0.0), 1e-300)
     rounded, group = np.unique(np.round(slopes / unit), axis=0, return_inverse=True)
     bounds = np.full(len(rounded), np.inf)
@@ -156,25 +141,25 @@ def _bounds(outer: InsetBody, constraint: Constraint, triangles: np.ndarray) -> 
     return bounds[least_first], (rounded * unit)[least_first]
 
 
-def _half_spaces(outer: InsetBody, inner: InsetBody) -> Iterator[Constraint]:
+def _half_spaces(outer: Solid, inner: Solid) -> Iterator[Constraint]:
     """Yield half-spaces along the largest facets of both bodies."""
-    normals = np.concatenate([-outer.body.solid.normals, inner.body.solid.normals])
+    normals = np.concatenate([-outer.normals, inner.normals])
     corners = np.concatenate([outer.corners, inner.corners])
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     _, first, group = np.unique(np.round(normals / SAME_DIRECTION), axis=0, return_index=True, return_inverse=True)
     largest = np.argsort(-np.bincount(group.ravel(), weights=areas), kind="stable")[:MAX_HALF_SPACES]
     for n in normals[first[largest]]:
-        directions = np.broadcast_to(n, (len(outer.body.solid.faces), 3))
+        directions = np.broadcast_to(n, (len(outer.faces), 3))
         yield Constraint(directions, np.zeros(len(directions)), inner.vertices @ n, None)
 
 
-def _hollows(outer: InsetBody, inner: InsetBody) -> Iterator[Constraint]:
+def _hollows(outer: Solid, inner: Solid) -> Iterator[Constraint]:
     """Yield the hollows around the axes of cylinders of both bodies, and between two axes at the ends of a slot."""
     centre = (inner.vertices.min(axis=0) + inner.vertices.max(axis=0)) / 2
-    bulge = float(outer.body.bulges.max(initial=0.0))
+    bulge = float(outer.bulges.max(initial=0.0))
     cores = [
         core
-        for core, radius in _cores([*outer.body.cylinders, *inner.body.cylinders], bulge)
+        for core, radius in _cores([*outer.cylinders, *inner.cylinders], bulge)
         if float(_distances(centre[None], core)[0]) < radius
     ]
     for core in cores[:MAX_CORES]:

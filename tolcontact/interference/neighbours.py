@@ -8,11 +8,13 @@ import igl
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.interference import depth_kernel, free_kernel, kernel, near_kernel, parting_kernel
-from tolcontact.interference.box_tree import BoxTree, box_tree, boxes_of_nodes
-from tolcontact.interference.deviating_solid import DeviatingSolid
-from tolcontact.interference.free_region import CORNERS, InsetBody, free_region
+from tolcontact.interference import depth_kernel, free_kernel, kernel, parting_kernel
+from tolcontact.interference.free_region import CORNERS, free_region
+from tolcontact.interference.kernel import LEAF
+from tolcontact.interference.solid import Solid
 
+LEVELS = 1 << 10  # cells along each side of a mesh, for sorting triangles
+FLAT = 1e-12  # of coordinates: how far corners of a facet may be from its plane
 MIN_TRIANGLES = 100  # of two bodies: with fewer, a complete test takes no longer than a certificate
 
 
@@ -44,7 +46,17 @@ class WayOut(NamedTuple):
     widths: Float[Array, " n"]
 
 
-FLAT = 1e-12  # of coordinates: how far corners of a facet may be from its plane
+class BoxTree(NamedTuple):
+    """A complete binary tree, its nodes in heap order: the children of node i are 2 i + 1 and 2 i + 2.
+
+    triangles   (leaf, LEAF): indices of the triangles in each leaf, -1 where there is none
+    boxes       (node, 6) [mm]: lower and upper corner of the box of each node; empty boxes reach from infinity to -infinity
+    next        (node,): the node that follows if the children of a node are left out; the number of nodes at the end
+    """
+
+    triangles: Int[Array, "l 4"]
+    boxes: Float[Array, "n 6"]
+    next: Int[Array, " n"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,23 +72,24 @@ class Neighbours:
     min_triangles  of both bodies; with fewer, no certificate is tried before the complete test
     """
 
-    A: DeviatingSolid
-    B: DeviatingSolid
+    A: Solid
+    B: Solid
     insets: tuple[float, float]
     reach: float
     round_faces: tuple[Int[Array, " t_A"], Int[Array, " t_B"]] | None = None
     min_triangles: float = MIN_TRIANGLES
 
     @cached_property
+    def _inset(self) -> tuple[Solid, Solid]:
+        """Both bodies, smaller by the insets."""
+        return self.A.inset(self.insets[0]), self.B.inset(self.insets[1])
+
+    @cached_property
     def _nominal(self) -> tuple[kernel.Side, kernel.Side]:
         """Both bodies without deviations."""
-        vertices_A, vertices_B = (body.inset(depth) for body, depth in zip((self.A, self.B), self.insets, strict=True))
-        none = (np.full(len(body.solid.faces), -1) for body in (self.A, self.B))
-        round_A, round_B = self.round_faces or none
-        return (
-            _side(self.A, vertices_A, round_A, self.B, vertices_B, round_B, self.reach),
-            _side(self.B, vertices_B, round_B, self.A, vertices_A, round_A, self.reach),
-        )
+        A, B = self._inset
+        round_A, round_B = self.round_faces or (np.full(len(body.faces), -1) for body in (A, B))
+        return _side(A, round_A, B, round_B, self.reach), _side(B, round_B, A, round_A, self.reach)
 
     @property
     def varies(self) -> bool:
@@ -86,9 +99,9 @@ class Neighbours:
     @cached_property
     def _regions(self) -> list[free_kernel.Region]:
         """Regions that nominally contain one body and that the other one does not reach; none if tests are quick anyway."""
-        A, B = (InsetBody(body, side.vertices) for body, side in zip((self.A, self.B), self._nominal, strict=True))
-        if len(self.A.solid.faces) + len(self.B.solid.faces) < self.min_triangles:
+        if len(self.A.faces) + len(self.B.faces) < self.min_triangles:
             return []
+        A, B = self._inset
         regions = (free_region(B, A, is_forward=True), free_region(A, B, is_forward=False))
         return [region for region in regions if region is not None]
 
@@ -145,56 +158,43 @@ class Neighbours:
         """Return the penetration of bodies at poses X_BA where they interfere."""
         result = Interference(np.empty(len(X_BA)), np.empty((len(X_BA), 2), dtype=np.int64), np.empty((len(X_BA), 2, 3)))
         depth_kernel.sound(*self._sides(deviations), np.ascontiguousarray(X_BA), *result)
-        for solid, side, triangles in zip((self.A.solid, self.B.solid), self._nominal, result.triangles.T, strict=True):
+        for solid, side, triangles in zip((self.A, self.B), self._nominal, result.triangles.T, strict=True):
             for row in np.flatnonzero(triangles < 0):
                 is_edge = (solid.edges == side.edges[-1 - triangles[row]]).all(axis=1)
                 triangles[row] = -1 - int(is_edge.argmax())
         return result._replace(depths=result.depths + sum(self.insets))
 
 
-def _columns(body: DeviatingSolid, deviations: np.ndarray) -> np.ndarray:
+def _columns(body: Solid, deviations: np.ndarray) -> np.ndarray:
     """Return the deviations (n, k) that move the faces of a body."""
     return np.ascontiguousarray(deviations[:, body.columns])
 
 
-def _side(
-    body: DeviatingSolid,
-    vertices: np.ndarray,
-    round_faces: np.ndarray,
-    target: DeviatingSolid,
-    vertices_of_target: np.ndarray,
-    round_faces_of_target: np.ndarray,
-    reach: float,
-) -> kernel.Side:
-    """Return a body with inset vertices (v, 3) for compiled passes, with the arrays that depend on the other body."""
-    solid, tree, tree_of_target = (
-        body.solid,
-        box_tree(vertices[body.solid.faces]),
-        box_tree(vertices_of_target[target.solid.faces]),
-    )
-    ends, distances = vertices[solid.edges], np.empty(len(solid.edges))
-    near_kernel.distances(ends.min(axis=1), ends.max(axis=1), tree_of_target.boxes, tree_of_target.next, distances)
+def _side(body: Solid, round_faces: np.ndarray, target: Solid, round_faces_of_target: np.ndarray, reach: float) -> kernel.Side:
+    """Return a body for compiled passes, with the arrays that depend on the other body. Both are smaller by their insets."""
+    vertices, corners = body.vertices, body.corners
+    tree, tree_of_target = box_tree(corners), box_tree(target.corners)
+    ends, distances = vertices[body.edges], np.empty(len(body.edges))
+    depth_kernel.distances(ends.min(axis=1), ends.max(axis=1), tree_of_target.boxes, tree_of_target.next, distances)
     order = np.argsort(distances, kind="stable")
-    squares, _, _ = igl.point_mesh_squared_distance(vertices, vertices_of_target, target.solid.faces)
-    witnesses = np.array([rows[np.argmax(squares[rows])] for rows in solid.components])
-    turns = igl.winding_number(vertices_of_target, target.solid.faces, np.ascontiguousarray(vertices[witnesses]))
-    corners = vertices[solid.faces]
+    squares, _, _ = igl.point_mesh_squared_distance(vertices, target.vertices, target.faces)
+    witnesses = np.array([rows[np.argmax(squares[rows])] for rows in body.components])
+    turns = igl.winding_number(target.vertices, target.faces, np.ascontiguousarray(vertices[witnesses]))
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     planes = np.column_stack([normals, (normals * corners[:, 0]).sum(axis=1)])
-    lists = _near_facets(ends[order], tree_of_target, vertices_of_target[target.solid.faces], target.facet_of, reach)
-    round_edges, round_facets = round_faces[solid.sides].max(axis=1), round_faces_of_target[target.first_of_facet]
-    lists = lists.without(round_edges[order], round_facets)
+    round_edges, round_facets = round_faces[body.sides].max(axis=1), round_faces_of_target[target.first_of_facet]
+    starts, listed, reaches = _near_facets(ends[order], round_edges[order], target, tree_of_target, round_facets, reach)
     return kernel.Side(
         vertices=vertices,
         moved=np.full(len(vertices), -1),
         motions=np.zeros((0, 0, 3)),
         deviations=np.zeros((1, 0)),
         shifts=np.zeros((0, 3)),
-        faces=solid.faces,
+        faces=body.faces,
         planes=planes,
-        edges=np.ascontiguousarray(solid.edges[order]),
-        sides=np.ascontiguousarray(body.facet_of[solid.sides[order]]),
-        outward=np.ascontiguousarray(solid.normals[solid.sides[order]].sum(axis=1)),
+        edges=np.ascontiguousarray(body.edges[order]),
+        sides=np.ascontiguousarray(body.facet_of[body.sides[order]]),
+        outward=np.ascontiguousarray(body.normals[body.sides[order]].sum(axis=1)),
         distances=distances[order],
         facets=np.concatenate(
             [_boxes_of_facets(body, corners.min(axis=1), corners.max(axis=1)), _planes_of_facets(body, corners, planes)], axis=1
@@ -202,8 +202,10 @@ def _side(
         facet_of=body.facet_of,
         members=np.argsort(body.facet_of, kind="stable"),
         first_members=np.cumsum([0, *np.bincount(body.facet_of)]),
-        vertices_of_facets=np.where(body.moves[body.first_of_facet][:, None], solid.faces[body.first_of_facet], -1),
-        **lists._asdict(),
+        vertices_of_facets=np.where(body.moves[body.first_of_facet][:, None], body.faces[body.first_of_facet], -1),
+        starts=starts,
+        listed=listed,
+        reaches=reaches,
         reach=reach,
         triangles=tree.triangles,
         boxes=tree.boxes,
@@ -215,34 +217,26 @@ def _side(
     )
 
 
-class _NearFacets(NamedTuple):
-    """See kernel.Side."""
+def _near_facets(
+    ends: np.ndarray, round_edges: np.ndarray, target: Solid, tree: BoxTree, round_facets: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return starts, listed and reaches (see kernel.Side) of the facets of a body within `reach` [mm] of edges (e, 2, 3).
 
-    starts: np.ndarray
-    listed: np.ndarray
-    reaches: np.ndarray
-
-    def without(self, round_edges: np.ndarray, round_facets: np.ndarray) -> "_NearFacets":
-        """Return the lists without facets (f,) of the same number of a round face as the edge (e,)."""
-        edge = np.repeat(np.arange(len(round_edges)), np.diff(self.starts))
-        kept = (round_edges[edge] < 0) | (round_edges[edge] != round_facets[self.listed])
-        starts = np.cumsum([0, *np.bincount(edge[kept], minlength=len(round_edges))])
-        return _NearFacets(starts, self.listed[kept], self.reaches[kept])
-
-
-def _near_facets(edges: np.ndarray, tree: BoxTree, corners: np.ndarray, facets: np.ndarray, reach: float) -> _NearFacets:
-    """Return the facets within `reach` [mm] of edges (e, 2, 3); triangles have `corners` (t, 3, 3)."""
-    boxes = np.ascontiguousarray(edges.min(axis=1)), np.ascontiguousarray(edges.max(axis=1))
+    Facets (f,) of the same number of a round face as the edge (e,) are left out.
+    """
+    corners = target.corners
+    boxes = np.ascontiguousarray(ends.min(axis=1)), np.ascontiguousarray(ends.max(axis=1))
     around = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
-    lists = _NearFacets(np.zeros(len(edges) + 1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
-    near_kernel.near_facets(*boxes, tree, around, facets, reach, False, *lists)
-    count = int(lists.starts[-1])
-    lists = lists._replace(listed=np.empty(count, dtype=np.int64), reaches=np.empty(count))
-    near_kernel.near_facets(*boxes, tree, around, facets, reach, True, *lists)
-    return lists
+    starts, listed, reaches = np.zeros(len(ends) + 1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
+    depth_kernel.near_facets(*boxes, tree, around, target.facet_of, reach, False, starts, listed, reaches)
+    listed, reaches = np.empty(starts[-1], dtype=np.int64), np.empty(starts[-1])
+    depth_kernel.near_facets(*boxes, tree, around, target.facet_of, reach, True, starts, listed, reaches)
+    edge = np.repeat(np.arange(len(ends)), np.diff(starts))
+    kept = (round_edges[edge] < 0) | (round_edges[edge] != round_facets[listed])
+    return np.cumsum([0, *np.bincount(edge[kept], minlength=len(ends))]), listed[kept], reaches[kept]
 
 
-def _planes_of_facets(body: DeviatingSolid, corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
+def _planes_of_facets(body: Solid, corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
     """Return the planes (f, 4) of the facets; NaN where corners (t, 3, 3) of their triangles lie off these planes.
 
     Coplanar triangles do not stay coplanar where a vertex of a smaller body cannot lie on all planes around it.
@@ -256,7 +250,7 @@ def _planes_of_facets(body: DeviatingSolid, corners: np.ndarray, planes: np.ndar
     return np.where(largest[:, None] > FLAT * size, np.nan, of_facets)
 
 
-def _boxes_of_facets(body: DeviatingSolid, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+def _boxes_of_facets(body: Solid, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Return the boxes (f, 6) of the facets, from the boxes of the triangles, `lower` to `upper` (t, 3)."""
     count = len(body.first_of_facet)
     boxes = np.concatenate([np.full((count, 3), np.inf), np.full((count, 3), -np.inf)], axis=1)
@@ -265,7 +259,7 @@ def _boxes_of_facets(body: DeviatingSolid, lower: np.ndarray, upper: np.ndarray)
     return boxes
 
 
-def _deviating(side: kernel.Side, body: DeviatingSolid, deviations: np.ndarray) -> kernel.Side:
+def _deviating(side: kernel.Side, body: Solid, deviations: np.ndarray) -> kernel.Side:
     """Return a body with the deviations (n, contributor) of some realizations."""
     (vertices, motions), of_body = body.motions, _columns(body, deviations)
     moved = side.moved.copy()
@@ -286,3 +280,54 @@ def _deviating(side: kernel.Side, body: DeviatingSolid, deviations: np.ndarray) 
         planes=np.where(body.moves[:, None], np.nan, side.planes),
         boxes=boxes_of_nodes(side.triangles, lower, upper),
     )
+
+
+def box_tree(corners: Float[Array, "t 3 3"]) -> BoxTree:
+    """Return the tree of triangles (t, 3, 3) [mm], which are sorted along a Morton curve."""
+    lower, upper = corners.min(axis=1), corners.max(axis=1)
+    leaves = 1 << max(int(np.ceil(np.log2(max(len(corners), 1) / LEAF))), 0)
+    order = np.argsort(_morton(corners.mean(axis=1)), kind="stable")
+    places = np.full(leaves * LEAF, -1)
+    # Triangles are spread over all leaves, so that all are about equally full.
+    leaf = np.arange(len(corners)) * leaves // max(len(corners), 1)
+    places[leaf * LEAF + np.arange(len(corners)) - np.searchsorted(leaf, leaf)] = order
+    triangles = places.reshape(leaves, LEAF)
+    return BoxTree(triangles, boxes_of_nodes(triangles, lower, upper), _successors(2 * leaves - 1))
+
+
+def boxes_of_nodes(triangles: Int[Array, "l 4"], lower: Float[Array, "t 3"], upper: Float[Array, "t 3"]) -> Float[Array, "n 6"]:
+    """Return the boxes of the nodes of a tree with `triangles` in its leaves, whose boxes are `lower` to `upper`."""
+    places = triangles.ravel()
+    boxes = np.concatenate([np.full((places.size, 3), np.inf), np.full((places.size, 3), -np.inf)], axis=1)
+    boxes[places >= 0] = np.concatenate([lower, upper], axis=1)[places[places >= 0]]
+    level = _joined(boxes, LEAF)
+    levels = [level]
+    while len(level) > 1:
+        level = _joined(level, 2)
+        levels.insert(0, level)
+    return np.concatenate(levels)
+
+
+def _joined(boxes: np.ndarray, count: int) -> np.ndarray:
+    """Return the boxes around each `count` boxes in a row."""
+    groups = boxes.reshape(-1, count, 6)
+    return np.concatenate([groups[..., :3].min(axis=1), groups[..., 3:].max(axis=1)], axis=1)
+
+
+def _successors(count: int) -> np.ndarray:
+    """Return the node that follows each node and its children, in preorder."""
+    successors = np.full(count, count)
+    for node in range(1, count):
+        successors[node] = node + 1 if node % 2 else successors[(node - 1) // 2]
+    return successors
+
+
+def _morton(points: np.ndarray) -> np.ndarray:
+    """Return the places of points (point, 3) on a Morton curve."""
+    lower, span = points.min(axis=0, initial=np.inf), np.ptp(points, axis=0).max() if len(points) else 1.0
+    cells = ((points - lower) / max(float(span), 1e-300) * (LEVELS - 1)).astype(np.int64)
+    code = np.zeros(len(points), dtype=np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return code

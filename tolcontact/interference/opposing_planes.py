@@ -6,6 +6,7 @@ edge between them that two of its facets share; nominally this edge has no lengt
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from functools import cache
 from itertools import combinations
 from typing import NamedTuple
 
@@ -146,12 +147,29 @@ def _facets(
 
 def _cuts(facets: Sequence[Facet]) -> Iterator[tuple[int, float, Cut]]:
     """Yield cuts, with the number of vertices that they end in, and the sum of the squares of their motions."""
-    count, vertices = len(facets), _Vertices(np.array([facet.normal for facet in facets]))
+    count, normals = len(facets), np.array([facet.normal for facet in facets])
+
+    @cache
+    def vertices_of(planes: tuple[int, ...]) -> list[tuple[tuple[int, ...], np.ndarray]]:
+        """Return the planes around each vertex that some planes around one need, and its motion (3,) if they move by 1.
+
+        Cuts leave the fewest vertices; there are none if no cut helps.
+        """
+        N = normals[list(planes)]
+        u = np.linalg.lstsq(N, np.ones(len(N)), rcond=MIN_SINGULAR)[0]
+        if np.abs(N @ u - 1).max() < CONSISTENT:
+            return [(planes, u)]
+        cuts = (cut for cut in combinations(range(len(planes)), 2) if cut[1] - cut[0] not in (1, len(planes) - 1))
+        halves = (
+            (vertices_of(planes[first : last + 1]), vertices_of(planes[last:] + planes[: first + 1])) for first, last in cuts
+        )
+        return min(([*left, *right] for left, right in halves if left and right), key=len, default=[])
+
     for first, last in combinations(range(count if count <= MAX_FACETS else 0), 2):
         if last - first in (1, count - 1):
             continue
         halves = [
-            vertices.of(tuple(k % count for k in range(*side))) for side in ((first, last + 1), (last, first + count + 1))
+            vertices_of(tuple(k % count for k in range(*side))) for side in ((first, last + 1), (last, first + count + 1))
         ]
         if not all(halves):
             continue
@@ -161,29 +179,3 @@ def _cuts(facets: Sequence[Facet]) -> Iterator[tuple[int, float, Cut]]:
             motions = sum(float(u @ u) for half in halves for _, u in half)
             are_whole = len(halves[0]) == 1, len(halves[1]) == 1
             yield len(halves[0]) + len(halves[1]), motions, Cut(first, last, first_at_end, last_at_end, are_whole)
-
-
-class _Vertices:
-    """The vertices that planes around one vertex need if they move by 1, as cuts leave them."""
-
-    def __init__(self, normals: np.ndarray) -> None:
-        self._normals = normals
-        self._known: dict[tuple[int, ...], list[tuple[tuple[int, ...], np.ndarray]]] = {}
-
-    def of(self, planes: tuple[int, ...]) -> list[tuple[tuple[int, ...], np.ndarray]]:
-        """Return the planes around each vertex, and how it moves (3,), for some planes around one; none if there are none."""
-        if planes not in self._known:
-            self._known[planes] = min(self._choices(planes), key=len, default=[])
-        return self._known[planes]
-
-    def _choices(self, planes: tuple[int, ...]) -> Iterator[list[tuple[tuple[int, ...], np.ndarray]]]:
-        N = self._normals[list(planes)]
-        u = np.linalg.lstsq(N, np.ones(len(N)), rcond=MIN_SINGULAR)[0]
-        if np.abs(N @ u - 1).max() < CONSISTENT:
-            yield [(planes, u)]
-            return
-        for first, last in combinations(range(len(planes)), 2):
-            if last - first not in (1, len(planes) - 1):
-                halves = self.of(planes[first : last + 1]), self.of(planes[last:] + planes[: first + 1])
-                if all(halves):
-                    yield [*halves[0], *halves[1]]

@@ -11,10 +11,9 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.discretization import Nominal
 from tolcontact.interference import kernel
-from tolcontact.interference.deviating_solid import DeviatingSolid
 from tolcontact.interference.free_region import CORNERS
 from tolcontact.interference.neighbours import Interference, Neighbours
-from tolcontact.interference.part_solid import curved_triangles, part_solid
+from tolcontact.interference.solid import Solid, curved_triangles, part_solid
 
 # Share of the smallest tolerance range: bodies interfere from this depth on, the diameter of a ball that lies in both of them.
 ALLOWED_SHARE = 9 / 10_000
@@ -63,7 +62,7 @@ class Watch:
     poses: Float[Array, "n part 12"]
     deviations: Float[Array, "n contributor"]
     _neighbours: dict[tuple[int, int], Neighbours | None] = field(default_factory=dict, init=False)
-    _solids: dict[int, DeviatingSolid | None] = field(default_factory=dict, init=False)
+    _solids: dict[int, Solid | None] = field(default_factory=dict, init=False)
 
     def allowing(self, allowed: Mapping[tuple[int, int], float]) -> "Watch":
         """Return the same bodies with other allowed depths."""
@@ -124,17 +123,17 @@ class Watch:
 
     def _round_faces(self, pair: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
         """Return the numbers (t,) of the pairs of round faces that the triangles of both bodies represent, -1 for none."""
-        numbers = [np.full(len(body.solid.faces), -1) for body in map(self.solid, pair) if body is not None]
+        numbers = [np.full(len(body.faces), -1) for body in map(self.solid, pair) if body is not None]
         for k, points in enumerate(self.nominal.pairs):
             if points.samples_faces or points.reference is None or ordered(points.moving, points.reference) != pair:
                 continue
             for part, face in ((points.moving, points.moving_face), (points.reference, points.reference_face)):
                 body = self.solid(part)
                 assert face is not None and body is not None
-                numbers[pair.index(part)][curved_triangles(body.solid, face)] = k
+                numbers[pair.index(part)][curved_triangles(body, face)] = k
         return numbers[0], numbers[1]
 
-    def solid(self, number: int) -> DeviatingSolid | None:
+    def solid(self, number: int) -> Solid | None:
         """Return the solid of a part; None if it is not closed."""
         if number not in self._solids:
             self._solids[number] = part_solid(self.nominal, number)

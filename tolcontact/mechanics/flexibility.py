@@ -18,18 +18,33 @@ from scipy import linalg, sparse
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.compiled import compiled
 from tolcontact.declaration import Mesh, Part, Point
 from tolcontact.discretization import Nominal, NominalPart, Weld
-from tolcontact.elasticity import ElasticBody, MatrixSource, MeshSource, elastic_body, responses
+from tolcontact.elasticity import ElasticBody, imported_body, meshed_body, responses
 from tolcontact.errors import Faults, GeometryFault, designation
 from tolcontact.geometry.files import FROM_PRODUCT
 from tolcontact.mechanics.groups import Group, Load
-from tolcontact.mechanics.opening_kernel import add_openings
 
 NULL = 1e-14  # of the largest eigenvalue of C, scaled to a unit diagonal: smaller ones are rounding
 SAME = 1e-12  # of the largest eigenvalue: of fewer motions at two-sided locators than there are locators
 
 Bodies = Mapping[Part, ElasticBody]
+
+
+@compiled
+def _add_openings(C, reactions, openings):  # type: ignore[no-untyped-def]
+    """Add C l to the openings (realization, row) [mm], with C (row, row) [mm/N], for reactions l (realization, row) [N].
+
+    Sums run over the rows under load in their order, so that a realization does not depend on the others. The function calls
+    no other compiled one, so that Numba notices every change (see tolcontact.compiled).
+    """
+    for k in range(len(reactions)):
+        for row in range(len(C)):
+            load = reactions[k, row]
+            if load != 0.0:
+                for i in range(len(C)):
+                    openings[k, i] += load * C[row, i]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +80,14 @@ class Flexibility:
 
     def openings(self, reactions: Float[Array, "realization row"]) -> Float[Array, "realization row"]:
         """Return the openings (realization, row) [mm] under reactions [N] of the rows, summed up in a fixed order."""
-        openings = np.tile(self.opening, (len(reactions), 1))
-        add_openings(self.C, np.ascontiguousarray(reactions), openings)
-        return openings
+        return self._opened(np.tile(self.opening, (len(reactions), 1)), reactions)
 
     def bent(self, reactions: Float[Array, "realization row"]) -> Float[Array, "realization row"]:
         """Return C l (realization, row) [mm]: the openings by reactions [N] of the rows, without constant forces."""
-        openings = np.zeros(reactions.shape)
-        add_openings(self.C, np.ascontiguousarray(reactions), openings)
+        return self._opened(np.zeros(reactions.shape), reactions)
+
+    def _opened(self, openings: np.ndarray, reactions: np.ndarray) -> np.ndarray:
+        _add_openings(self.C, np.ascontiguousarray(reactions), openings)
         return openings
 
 
@@ -151,21 +166,21 @@ class Bending:
 def elastic_bodies(nominal: Nominal) -> Bodies:
     """Return the bodies of the elastic parts. Raises ModelError, with a sentence for each part whose body cannot be made."""
     faults, parts = Faults(), {part.part: part for part in nominal.parts if part.part.elasticity is not None}
-    bodies = {part: faults.attempt(designation("part", part), elastic_body, _source(entry)) for part, entry in parts.items()}
+    bodies = {part: faults.attempt(designation("part", part), _body, entry) for part, entry in parts.items()}
     faults.refuse(nominal.assembly.name)
     return {part: body for part, body in bodies.items() if body is not None}
 
 
-def _source(entry: NominalPart) -> MeshSource | MatrixSource:
+def _body(entry: NominalPart) -> ElasticBody:
     elastic, mesh, geometry = entry.part.elasticity, entry.mesh, entry.part.geometry
     assert elastic is not None
     if elastic.stiffness is not None and elastic.nodes is not None:
-        return MatrixSource(Path(elastic.stiffness), Path(elastic.nodes), mesh.vertices, mesh.faces)
+        return imported_body(Path(elastic.stiffness), Path(elastic.nodes), mesh.vertices, mesh.faces)
     assert elastic.E is not None and elastic.nu is not None
     R, _ = mesh.metadata.get(FROM_PRODUCT, (np.eye(3), None))
     is_mirrored = np.linalg.det(R) < 0  # which is no solid of its file
     step = geometry.source if isinstance(geometry, Mesh) and geometry.is_step and not is_mirrored else None
-    return MeshSource(mesh.vertices, mesh.faces, elastic.E, elastic.nu, elastic.density, step, elastic.element_size)
+    return meshed_body(mesh.vertices, mesh.faces, elastic.E, elastic.nu, elastic.density, step, elastic.element_size)
 
 
 def with_weights(group: Group, nominal: Nominal, bodies: Bodies) -> Group:

@@ -106,10 +106,10 @@ def gap_map(G: np.ndarray, offsets: Offsets) -> GapMap:
         rank += 1
     basis = np.column_stack([centre, U[:, :rank]])
     coordinates = np.vstack([np.ones(G.shape[1]), S[:rank, None] * V[:rank], -offsets.matrix])
-    return GapMap(basis, offsets.columns, coordinates, _corners(coordinates[1:]))
+    return GapMap(basis, offsets.columns, coordinates, hull_corners(coordinates[1:]))
 
 
-def _corners(coordinates: np.ndarray) -> np.ndarray:
+def hull_corners(coordinates: np.ndarray) -> np.ndarray:
     """Return the corners of the convex hull of points (coordinate, point), in order; all points beyond two coordinates.
 
     Coordinates that are equal for all points are left out.

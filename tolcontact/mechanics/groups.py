@@ -7,8 +7,7 @@ import numpy as np
 
 from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.discretization import ContactPoints, Nominal
-from tolcontact.mechanics.correction import Mobility
-from tolcontact.mechanics.displacement import moment_table
+from tolcontact.mechanics.correction import Mobility, moment_table
 from tolcontact.mechanics.pose import Number, Vector
 from tolcontact.method import Method
 
@@ -143,7 +142,7 @@ def contact_groups(nominal: Nominal, method: Method) -> list[Group]:
     chains = [part.movers for part in nominal.parts]
     clusters: list[set[int]] = []
     for pair in nominal.pairs:
-        joined = set(chains[pair.moving]) | _movers_of(pair.reference, chains)
+        joined = _movers_of(pair, chains)
         for cluster in [c for c in clusters if c & joined]:
             clusters.remove(cluster)
             joined |= cluster
@@ -151,16 +150,12 @@ def contact_groups(nominal: Nominal, method: Method) -> list[Group]:
     return [_group(nominal, chains, tuple(sorted(cluster)), method) for cluster in clusters]
 
 
-def _movers_of(part: int | None, chains: Sequence[tuple[int, ...]]) -> set[int]:
-    return set() if part is None else set(chains[part])
+def _movers_of(pair: ContactPoints, chains: Sequence[tuple[int, ...]]) -> set[int]:
+    return {mover for part in (pair.moving, pair.reference) if part is not None for mover in chains[part]}
 
 
 def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int, ...], method: Method) -> Group:
-    members = [
-        (index, pair)
-        for index, pair in enumerate(nominal.pairs)
-        if (set(chains[pair.moving]) | _movers_of(pair.reference, chains)) & set(free)
-    ]
+    members = [(index, pair) for index, pair in enumerate(nominal.pairs) if _movers_of(pair, chains) & set(free)]
     moved = {part for part, chain in enumerate(chains) if set(chain) & set(free)}
     neighbours = {part for _, pair in members for part in (pair.moving, pair.reference)} | {
         nominal.parts[part].parent for part in free

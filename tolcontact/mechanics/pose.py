@@ -15,6 +15,7 @@ ENTRIES = poses.ENTRIES
 Number = float | ca.SX  # a number of the model, or its symbol in a function that several pairs share
 Vector = np.ndarray | ca.SX
 
+POLAR_STEPS = 4  # of Newton's method, from a nearly orthogonal matrix
 # Keeps sqrt differentiable at theta = 0. Its square root is far below any angle, so the formulas below stay exact.
 _TINY = 1e-300
 
@@ -61,9 +62,9 @@ def rotation(theta: ca.SX) -> ca.SX:
     return ca.SX.eye(3) + (ca.sin(angle) / angle) * K + (half**2 / 2) * (K @ K)
 
 
-def nearest_rotation(R: ca.SX, steps: int = 4) -> ca.SX:
+def nearest_rotation(R: ca.SX) -> ca.SX:
     """Return the rotation nearest to a nearly orthogonal matrix R (3, 3), by Newton's iteration for its polar factor."""
-    for _ in range(steps):
+    for _ in range(POLAR_STEPS):
         R = R @ (3 * ca.SX.eye(3) - R.T @ R) / 2
     return R
 
@@ -71,3 +72,10 @@ def nearest_rotation(R: ca.SX, steps: int = 4) -> ca.SX:
 def relative(X_WM: Pose, X_WR: Pose) -> Pose:
     """Return X_RM, the pose of the moving part in the frame of the reference part."""
     return Pose(X_WR.R.T @ X_WM.R, X_WR.R.T @ (X_WM.t - X_WR.t))
+
+
+def congruent(B: ca.SX, A: ca.SX) -> ca.SX:
+    """Return A'BA (n, n) for a symmetric B (m, m) and A (m, n). The lower triangle is a copy of the upper one."""
+    product = B @ A
+    entries = ca.triu(ca.mtimes(A.sparsity().T, product.sparsity()))
+    return ca.triu2symm(ca.mac(A.T, product, ca.SX.zeros(entries)))

@@ -31,9 +31,8 @@ class ClashPlace(NamedTuple):
         """Return the place of a realization."""
         sides = []
         for body, triangle in zip(pair, interference.triangles[row], strict=True):
-            deviating = watch.solid(body)
-            assert deviating is not None
-            solid = deviating.solid
+            solid = watch.solid(body)
+            assert solid is not None
             if triangle >= 0:
                 numbers = np.array([triangle])
             else:

@@ -4,13 +4,13 @@ import re
 from pathlib import Path
 
 from tolcontact.errors import OptionError
-from tolcontact.input_files import fault_of
 from tolcontact.pmi.annotations import Pmi
 from tolcontact.pmi.aspects import Aspects
 from tolcontact.pmi.datums import datums_of
 from tolcontact.pmi.dimensions import dimensions_of
 from tolcontact.pmi.part21 import Records
 from tolcontact.pmi.tolerances import tolerances_of
+from tolcontact.tables import fault_of
 from tolcontact.texts import clipped
 
 MAX_SIZE = 2_000_000_000  # [byte]; reading takes several times as much memory

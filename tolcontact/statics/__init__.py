@@ -8,13 +8,5 @@ from tolcontact.statics.critical_friction import Balance, Seat, balances
 from tolcontact.statics.touching import TOUCH_SHARE, Contact, Touching, TouchingPoints, contacts_at, drawn_contacts
 
 __all__ = [
-    "TOUCH_SHARE",
-    "Balance",
-    "Contact",
-    "Seat",
-    "Touching",
-    "TouchingPoints",
-    "balances",
-    "contacts_at",
-    "drawn_contacts",
-]
+    "TOUCH_SHARE", "Balance", "Contact", "Seat", "Touching", "TouchingPoints", "balances", "contacts_at", "drawn_contacts",
+]  # fmt: skip

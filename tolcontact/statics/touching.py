@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.discretization import ContactPoints, Nominal
+from tolcontact.mechanics.gap import hull_corners
 
 TOUCH_SHARE = 1e-6  # of a face's size: faces at a smaller distance touch
 FLATNESS = 1e-9  # of the extent of points: smaller deviations from a plane or a line are rounding
@@ -136,17 +136,9 @@ def supporting_points(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     If all normals (point, 3) are equal and the points lie in one plane, these are the corners of their hull: a force within the
     friction cone of any point is the sum of forces within the cones of the corners, with the same moment.
     """
-    indices = np.arange(len(points))
     if len(points) < 2 or np.ptp(normals, axis=0).max() > FLATNESS:
-        return indices
+        return np.arange(len(points))
     _, sizes, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     rank = int((sizes > FLATNESS * sizes[0]).sum())
     coordinates = (points - points.mean(axis=0)) @ axes[:rank].T
-    if rank == 1:
-        return np.unique([coordinates.argmin(), coordinates.argmax()])
-    if rank == 2 and len(points) > 3:
-        try:
-            return np.sort(ConvexHull(coordinates).vertices)
-        except QhullError:  # the points lie almost on one line
-            pass
-    return indices
+    return hull_corners(coordinates.T) if rank else np.arange(len(points))

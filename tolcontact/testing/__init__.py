@@ -26,8 +26,8 @@ from tolcontact.discretization import ContactPoints
 from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.method import Method
-from tolcontact.testing.archived_datums import tangents
-from tolcontact.testing.referee import ArchivedPair, MissingVariableError, Rows
+from tolcontact.testing.archived_faces import tangents
+from tolcontact.testing.referee import ArchivedPair, Rows
 from tolcontact.workflow import build
 
 __all__ = ["assert_datums_recompute", "assert_gaps_recompute", "assert_no_clashes", "assert_resolved", "assert_same_run"]
@@ -48,7 +48,9 @@ def assert_resolved(results: Results) -> None:
         status, numbers = _rows(tree)[terms.STATUS.name].values, _numbers(tree)
     unresolved = ~np.isin(status, terms.CERTIFIED)
     if unresolved.any():
-        by_status = [f"{_meaning(code)} {_listed(numbers[status == code])}" for code in np.unique(status[unresolved])]
+        meanings = dict(enumerate(terms.STATUS_MEANINGS))
+        codes = np.unique(status[unresolved])
+        by_status = [f"{meanings.get(int(k), f'status {k}')} {_listed(numbers[status == k])}" for k in codes]
         raise AssertionError(f"{unresolved.sum()} of {status.size} realizations are not resolved: {', '.join(by_status)}")
 
 
@@ -94,7 +96,8 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
     """
     with opened(results) as tree:
         rows, numbers = _rows(tree), _numbers(tree)
-        archived, comparable = rows[terms.GAP_MIN.name], _comparable(rows)
+        archived = rows[terms.GAP_MIN.name]
+        comparable = np.asarray(rows[terms.SEARCHED.name].values != 1)  # the archive holds the points that gaps refer to
         largest, place, meetings = 0.0, "", _meetings(tree)
         for number, name in enumerate(archived[terms.PAIR].values):
             pair = ArchivedPair(tree, number, *meetings.get(number, (None, None)))
@@ -102,7 +105,7 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
             count = max(1, MAX_GAPS // len(pair.normal))
             for start in range(0, len(comparable), count):
                 piece = slice(start, start + count)
-                gaps, stored = _least_gaps(pair, rows_of_pair, piece), archived[piece, :, number].values
+                gaps, stored = pair.gaps(rows_of_pair, piece).min(axis=-1), archived[piece, :, number].values
                 with np.errstate(invalid="ignore"):
                     errors = np.where(gaps == stored, 0.0, np.abs(gaps - stored))[comparable[piece]]
                 errors[np.isnan(errors)] = np.inf
@@ -201,10 +204,6 @@ def _numbers(tree: xr.DataTree) -> np.ndarray:
     return np.asarray(tree.to_dataset()[terms.REALIZATION].values)
 
 
-def _meaning(status: int) -> str:
-    return dict(enumerate(terms.STATUS_MEANINGS)).get(int(status), f"status {status}")
-
-
 def _listed(numbers: np.ndarray) -> str:
     """Return the count of realizations, and the first of their numbers."""
     named = ", ".join(map(str, numbers[:NAMED_REALIZATIONS]))
@@ -219,21 +218,6 @@ def _meetings(tree: xr.DataTree) -> dict[int, tuple[Meeting, ContactPoints]]:
     method = Method(**{choice.name: tree.attrs[choice.name] for choice in fields(Method)})
     program = build(model_of(tree), solver=tree.attrs["solver"], method=method)
     return {number: (meeting, program.nominal.pairs[number]) for number, meeting in program.meetings.items()}
-
-
-def _comparable(rows: Rows) -> np.ndarray:
-    """Return whether the archive holds the contact points that `gap_min` refers to, (realization,)."""
-    return np.asarray(rows[terms.SEARCHED.name].values != 1)
-
-
-def _least_gaps(pair: ArchivedPair, rows: Rows, piece: slice) -> np.ndarray:
-    """Return the least gaps (realization, state) [mm] of a piece of the realizations."""
-    try:
-        return pair.gaps(rows, piece).min(axis=-1)
-    except MissingVariableError as error:
-        raise AssertionError(
-            f'gaps cannot be computed again without {error}, which was not kept: tc.run(..., keep="all")'
-        ) from error
 
 
 def _difference(name: str, expected: Rows, actual: Rows, numbers: np.ndarray) -> str:

@@ -10,24 +10,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as terms
 from tolcontact.discretization import ContactPoints, rim_points
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.surface import Surface
-from tolcontact.testing.archived_bending import ArchivedBending
-from tolcontact.testing.archived_form import ArchivedForm
+from tolcontact.testing.archived_faces import ArchivedFaces
 
 DIRECTIONS = 72  # initial samples
 NARROWINGS = 60
 POSES_AT_ONCE = 256
 GOLDEN = (np.sqrt(5) - 1) / 2
 Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
-
-
-class MissingVariableError(LookupError):
-    """An error for an archive without a variable that the computation of gaps needs."""
 
 
 def archived_points(contact: Mapping[str, np.ndarray], points: np.ndarray) -> "list[ArchivedPoint]":
@@ -131,65 +125,27 @@ class ArchivedPoint(NamedTuple):
         return np.hypot(across - wall["radius"], along) - wall["minor"]
 
 
-class ArchivedFaces:
-    """The faces of features, from the groups `contact` and `sample` of an archive, variables by name."""
+class ArchivedBending:
+    """How elastic parts open the gaps at some contact points, by their indices; `loads` are the loads at these points.
 
-    def __init__(self, contact: Mapping[str, np.ndarray], sample: Mapping[str, np.ndarray]) -> None:
-        self._contact, self._sample = contact, sample
+    holds   (load,): whether it is a two-sided locator, whose gap counts either way
+    """
 
-    def displacement(self, face: int, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return tau (realization, 3) [mm] and rho (realization, 3) [rad] for deviations (realization, contributor)."""
-        twist = deviations @ self._contact[terms.FACE_TWIST.name][face].T
-        return twist[:, :3], twist[:, 3:]
+    def __init__(self, tree: xr.DataTree, points: np.ndarray) -> None:
+        group = tree.children[terms.ELASTIC_GROUP].to_dataset()
+        self.loads = np.flatnonzero(np.isin(group[terms.POINT_OF_LOAD.name].values, points))
+        self.holds = group[terms.HOLDS.name].values[self.loads] != 0
+        self._by_load = group[terms.FLEXIBILITY.name].values[self.loads]
+        self._by_forces = group[terms.OPENING.name].values[self.loads]
+        self._weld_rows = group[terms.WELD_OF_LOAD.name].values[self.loads]
 
-    def height(self, face: int, deviations: np.ndarray) -> np.ndarray:
-        """Return the outward offset of a face (realization,) [mm]; 0 for face -1."""
-        if face < 0:
-            return np.zeros(len(deviations))
-        return deviations @ self._contact[terms.FACE_HEIGHT.name][face]
+    def kept(self, gaps: np.ndarray) -> np.ndarray:
+        """Return the gaps (realization, point) [mm] that welds keep, from those of all welds; 0 of other points."""
+        return np.where(self._weld_rows >= 0, gaps[:, self._weld_rows], 0.0) if gaps.size else np.zeros((1, len(self.loads)))
 
-    def modes(self, face: int, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the contributors (mode,) of the form of a face, and their heights (..., mode) at points (..., 3) [mm]."""
-        if face < 0 or terms.FORM_COVARIANCE.name not in self._contact or not self._contact[terms.FORM_COVARIANCE.name][face]:
-            return np.zeros(0, dtype=int), np.zeros((*places.shape[:-1], 0))
-        columns = self._contact[terms.FORM_CONTRIBUTOR.name][face]
-        return columns[columns >= 0], ArchivedForm(self._contact, face).heights(places)[..., columns >= 0]
-
-    def form(self, face: int, deviations: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Return the form deviation (realization, point) [mm] of a face at points (point, 3), or at one point each."""
-        columns, heights = self.modes(face, places)
-        if places.ndim == 2:
-            return deviations[:, columns] @ heights.T if columns.size else np.zeros((len(deviations), len(places)))
-        return np.einsum("npm,nm->np", heights, deviations[:, columns])
-
-    def placed(self, face: int, deviations: np.ndarray, R: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return R and t of a face of a part at R (realization, state, 3, 3), t (realization, state, 3) [mm]."""
-        if face < 0:
-            return R, t
-        tau, rho = self.displacement(face, deviations)
-        turned, centre = Rotation.from_rotvec(rho).as_matrix(), self._contact[terms.FACE_CENTRE.name][face]
-        moved = tau + centre - turned @ centre
-        return R @ turned[:, None], np.einsum("...ij,...j->...i", R, moved[:, None]) + t
-
-    def directions(self, locators: np.ndarray) -> np.ndarray:
-        """Return the directions (locator, 3) of locators."""
-        return np.asarray(self._sample[terms.LOCATOR_DIRECTION.name][locators])
-
-    def pushes(self, locators: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        """Return the displacements (realization, locator) [mm] of parts by their locators."""
-        pushes = deviations[:, locators].copy()
-        none = np.full(max(locators, default=0) + 1, -1)
-        for variable, sign in ((terms.FACE_OF_LOCATOR, -1.0), (terms.GROUND_OF_LOCATOR, 1.0)):
-            for place, locator in enumerate(locators):
-                face = int(self._sample.get(variable.name, none)[locator])
-                if face >= 0:
-                    tau, rho = self.displacement(face, deviations)
-                    arm = self._sample[terms.LOCATOR_POINT.name][locator] - self._contact[terms.FACE_CENTRE.name][face]
-                    inward = self._sample[terms.LOCATOR_DIRECTION.name][locator]
-                    point = self._sample[terms.LOCATOR_POINT.name][[locator]]
-                    pushes[:, place] += self.height(face, deviations) + sign * (tau + np.cross(rho, arm)) @ inward
-                    pushes[:, place] += self.form(face, deviations, point)[:, 0]
-        return pushes
+    def openings(self, loads: np.ndarray) -> np.ndarray:
+        """Return the openings (realization, point) [mm] under reactions `loads` (realization, load) [N]."""
+        return np.asarray(loads @ self._by_load.T + self._by_forces)
 
 
 class ArchivedPair:
@@ -232,7 +188,7 @@ class ArchivedPair:
     def gaps(self, rows: Rows, piece: slice) -> np.ndarray:
         """Return the gaps (realization, state, point) [mm] of a piece of the realizations; parts bend in corrected states only.
 
-        Raises MissingVariableError, with the name of a required variable that the archive does not have.
+        Raises AssertionError, with the name of a required variable that the archive does not have.
         """
         gaps = self._rigid_gaps(rows, piece)
         if self.bending is not None and self.bending.loads.size:
@@ -335,5 +291,5 @@ def _pose(rows: Rows, piece: slice, part: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _needed(rows: Rows, name: str, piece: slice) -> np.ndarray:
     if name not in rows:
-        raise MissingVariableError(f'"{name}"')
+        raise AssertionError(f'gaps cannot be computed again without "{name}", which was not kept: tc.run(..., keep="all")')
     return np.asarray(rows[name][piece].values)

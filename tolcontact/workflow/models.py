@@ -23,8 +23,7 @@ from tolcontact.method import Method, Solver
 from tolcontact.plausibility import warn_of_nominal
 from tolcontact.replacing import check_identities
 from tolcontact.simulation import block_rows, simulate_blocks
-from tolcontact.system.machine import machine_memory
-from tolcontact.system.resources import peak_memory
+from tolcontact.system.machine import machine_memory, peak_memory
 from tolcontact.vocabulary import BLOCK_ROWS
 
 DEFAULT_SOLVER: Solver = "qpoases"

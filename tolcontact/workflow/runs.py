@@ -21,13 +21,12 @@ from tolcontact.compilation import Program
 from tolcontact.contact import pair_search
 from tolcontact.errors import OptionError, check_choice
 from tolcontact.method import Solver
-from tolcontact.replacing import check_identities
+from tolcontact.replacing import check_identities, temporary_folder
 from tolcontact.simulation import Block, ProgramFunction, block_rows
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.run_checks import COMPARED_ROWS, MIN_COMPARED, by_objective, check_surfaces, simulated_poses, warn_of
 from tolcontact.statistics import STATISTICS, BlockSums, DisplacementFields, TouchingShares, estimate_of
 from tolcontact.statistics.measure_statistics import HALF_WIDTH, StatisticRequest
-from tolcontact.temporary import temporary_folder
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, OBJECTIVES_GROUP, OUTSIDE, PLANS, PPM, FieldChoice, Kept, Plan
 from tolcontact.workflow.accessor import Results
 from tolcontact.workflow.models import Choice, Model, announce, check_counts, check_program, program_of

@@ -20,7 +20,7 @@ from tolcontact.compilation.functions.translation import OPERATIONS
 from tolcontact.compilation.qp_terms import inline, is_convex
 from tolcontact.discretization import discretize
 from tolcontact.mechanics.groups import contact_groups
-from tolcontact.mechanics.pair_gaps import pair_gaps
+from tolcontact.mechanics.round_gap import pair_gaps
 from tolcontact.simulation import simulate_blocks
 
 RNG = np.random.default_rng(5)

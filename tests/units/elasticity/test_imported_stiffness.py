@@ -5,7 +5,7 @@ import pytest
 
 from tests.units.elasticity import matrix_files
 from tests.units.elasticity.bricks import bernoulli_frame, bricks
-from tolcontact.elasticity import MatrixSource, elastic_body, flexibility
+from tolcontact.elasticity import flexibility, imported_body
 from tolcontact.errors import GeometryFault
 
 NODES, STIFFNESS = bricks((40, 10, 5), (4, 2, 2))
@@ -31,7 +31,7 @@ def source(folder, writer=matrix_files.npz, matrix=STIFFNESS, freedoms=FREEDOMS,
     writer(stiffness, freedoms, matrix)
     rows = [f"{number};{x!r};{y!r};{z!r}" for number, (x, y, z) in zip(numbers, nodes.tolist(), strict=True)]
     table.write_text("\n".join(["node;x;y;z", *rows]))
-    return MatrixSource(stiffness, table, **options)
+    return {"stiffness": stiffness, "nodes": table, **options}
 
 
 def exact_flexibility(nodes, stiffness, loads):
@@ -50,7 +50,7 @@ def balanced(nodes, loads):
 @pytest.mark.parametrize("kind", WRITERS)
 def test_a_matrix_from_a_file_is_as_flexible_as_the_body(tmp_path, kind):
     writer, tolerance = WRITERS[kind]
-    body = elastic_body(source(tmp_path, writer))
+    body = imported_body(**source(tmp_path, writer))
     assert np.array_equal(body.nodes, NODES)
     at = NODES[[0, 8, 20, 31, 44, 3, 26]]
     loads = body.spread(np.repeat(at, 3, axis=0), np.tile(np.eye(3), (7, 1)), None)
@@ -64,7 +64,7 @@ def test_a_matrix_from_a_file_is_as_flexible_as_the_body(tmp_path, kind):
 
 
 def test_displacements_have_no_mean_rigid_motion_and_store_the_work_of_the_forces(tmp_path):
-    body = elastic_body(source(tmp_path))
+    body = imported_body(**source(tmp_path))
     force = np.random.default_rng(1).normal(size=(STIFFNESS.shape[0], 2))
     u = body.response(force)
     moved = u.reshape(len(NODES), 3, 2)
@@ -85,7 +85,7 @@ def test_rotations_of_nodes_are_condensed(tmp_path):
     both = np.r_[0:6, 54:60]
     stiffness[np.ix_(both, both)] += arm
     freedoms = [(number, direction) for number in range(1, 11) for direction in range(1, 7)]
-    body = elastic_body(source(tmp_path, matrix_files.abaqus, stiffness, freedoms, nodes, np.arange(1, 11)))
+    body = imported_body(**source(tmp_path, matrix_files.abaqus, stiffness, freedoms, nodes, np.arange(1, 11)))
     assert body.nodes.shape == (10, 3)
     across = np.cross(nodes[8] - nodes[0], [0, 0, 1.0])
     across /= np.linalg.norm(across)
@@ -99,8 +99,8 @@ def test_modes_of_a_substructure_are_condensed_too(tmp_path):
     """Fixed-interface modes are freedoms 0 of scalar points. They have no coupling to nodes, so no static force moves them."""
     matrix = np.zeros((len(STIFFNESS) + 2,) * 2)
     matrix[:-2, :-2], matrix[-2:, -2:] = STIFFNESS, np.diag([3e7, 4e8])
-    body = elastic_body(source(tmp_path, matrix_files.dmig, matrix, [*FREEDOMS, (900001, 0), (900002, 0)]))
-    plain = elastic_body(source(tmp_path, matrix_files.dmig))
+    body = imported_body(**source(tmp_path, matrix_files.dmig, matrix, [*FREEDOMS, (900001, 0), (900002, 0)]))
+    plain = imported_body(**source(tmp_path, matrix_files.dmig))
     loads = plain.spread(NODES[[0, 8]], np.eye(3)[[2, 2]], None)
     assert flexibility(body, loads) == pytest.approx(flexibility(plain, loads), rel=1e-9)
 
@@ -154,7 +154,7 @@ NUMBERED = [matrix_files.free_dmig, matrix_files.abaqus, matrix_files.calculix, 
 def test_a_planted_fault_has_one_message(tmp_path, fault, writer):
     arguments, message = FAULTS[fault]
     with pytest.raises(GeometryFault, match=message) as caught:
-        elastic_body(source(tmp_path, writer, **arguments))
+        imported_body(**source(tmp_path, writer, **arguments))
     assert "part." in str(caught.value) or "nodes.csv" in str(caught.value)
 
 
@@ -164,10 +164,10 @@ def test_a_planted_fault_has_one_message(tmp_path, fault, writer):
 )  # no other matrix at the end
 def test_a_truncated_file_has_one_message(tmp_path, kind, share):
     arguments = source(tmp_path, WRITERS[kind][0])
-    content = arguments.stiffness.read_bytes()
-    arguments.stiffness.write_bytes(content[: int(share * len(content))])
+    content = arguments["stiffness"].read_bytes()
+    arguments["stiffness"].write_bytes(content[: int(share * len(content))])
     with pytest.raises(GeometryFault) as caught:
-        elastic_body(arguments)
+        imported_body(**arguments)
     assert len(str(caught.value).splitlines()) == 1
     assert "cannot be read" in str(caught.value) or "cut off" in str(caught.value), str(caught.value)
 
@@ -177,12 +177,12 @@ def test_a_truncated_table_of_nodes_is_named(tmp_path):
     np.savez(tmp_path / "n.npz", nodes=NODES)
     (tmp_path / "n.npz").write_bytes((tmp_path / "n.npz").read_bytes()[:500])
     with pytest.raises(GeometryFault, match=r'node file ".*n.npz" cannot be read'):
-        elastic_body(MatrixSource(tmp_path / "k.npz", tmp_path / "n.npz"))
+        imported_body(tmp_path / "k.npz", tmp_path / "n.npz")
 
 
 def test_rows_without_numbers_are_as_many_as_the_table_has(tmp_path):
     with pytest.raises(GeometryFault, match=r"135 rows, and the 43 nodes of .* have 129 displacements"):
-        elastic_body(source(tmp_path, nodes=NODES[:-2], numbers=NUMBERS[:-2]))
+        imported_body(**source(tmp_path, nodes=NODES[:-2], numbers=NUMBERS[:-2]))
 
 
 def test_a_mechanism_is_found(tmp_path):
@@ -192,35 +192,35 @@ def test_a_mechanism_is_found(tmp_path):
     with pytest.raises(GeometryFault, match=r"has 6 motions in addition to the six rigid ones"):
         two = np.concatenate([nodes, nodes + np.array([30, 0, 0])])
         freedoms = [(number, direction) for number in range(24) for direction in (1, 2, 3)]
-        elastic_body(source(tmp_path, matrix_files.npz, stiffness, freedoms, two, np.arange(24)))
+        imported_body(**source(tmp_path, matrix_files.npz, stiffness, freedoms, two, np.arange(24)))
 
 
 def test_single_precision_passes_where_it_suffices_and_not_where_a_motion_is_lost_in_it(tmp_path):
     single = STIFFNESS.astype(np.float32).astype(float)
-    body, exact = elastic_body(source(tmp_path, matrix=single)), elastic_body(source(tmp_path))
+    body, exact = imported_body(**source(tmp_path, matrix=single)), imported_body(**source(tmp_path))
     loads = exact.spread(NODES[[0, 8, 20]], np.eye(3), None)
     assert flexibility(body, loads) == pytest.approx(flexibility(exact, loads), rel=1e-2, abs=1e-2 * 1e-5)
     nodes, sheet = bricks((400, 400, 0.5), (4, 4, 1))
     numbers = np.arange(len(nodes))
     freedoms = [(number, direction) for number in numbers for direction in (1, 2, 3)]
-    elastic_body(source(tmp_path, matrix_files.npz, sheet, freedoms, nodes, numbers))
+    imported_body(**source(tmp_path, matrix_files.npz, sheet, freedoms, nodes, numbers))
     with pytest.raises(GeometryFault, match=r"lost in the rounding.*more digits"):
         coarse = sheet.astype(np.float32).astype(float)
-        elastic_body(source(tmp_path, matrix_files.npz, coarse, freedoms, nodes, numbers))
+        imported_body(**source(tmp_path, matrix_files.npz, coarse, freedoms, nodes, numbers))
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1 / 25.4, "in"), (1e-3, "m"), (0.1, "cm")])
 def test_nodes_in_other_units_are_found_on_the_part(tmp_path, factor, unit):
     surface = block((0, 0, 0), (40, 10, 5))
-    elastic_body(source(tmp_path, vertices=surface[0], faces=surface[1], tolerance=3.0))
+    imported_body(**source(tmp_path, vertices=surface[0], faces=surface[1], tolerance=3.0))
     with pytest.raises(GeometryFault, match=rf"nodes do not lie on the part.*they do if they are in {unit}"):
-        elastic_body(source(tmp_path, nodes=factor * NODES, vertices=surface[0], faces=surface[1], tolerance=3.0))
+        imported_body(**source(tmp_path, nodes=factor * NODES, vertices=surface[0], faces=surface[1], tolerance=3.0))
 
 
 def test_nodes_of_another_frame_are_found(tmp_path):
     surface = block((0, 0, 0), (40, 10, 5))
     with pytest.raises(GeometryFault, match=r"100 mm from its surface.*in the part's own frame"):
-        elastic_body(source(tmp_path, nodes=NODES + np.array([0, 0, 100]), vertices=surface[0], faces=surface[1]))
+        imported_body(**source(tmp_path, nodes=NODES + np.array([0, 0, 100]), vertices=surface[0], faces=surface[1]))
 
 
 def block(lower, upper):
@@ -230,7 +230,7 @@ def block(lower, upper):
 
 
 def test_a_force_between_nodes_is_refused_with_the_distance(tmp_path):
-    body = elastic_body(source(tmp_path))
+    body = imported_body(**source(tmp_path))
     with pytest.raises(GeometryFault, match=r"no node at \(3, 0, 0\).*3 mm away"):
         body.spread(np.array([[3.0, 0, 0]]), np.eye(3)[:1], 2.0)
     with pytest.raises(GeometryFault, match=r"mass is unknown.*density"):
@@ -266,7 +266,7 @@ def test_a_damaged_file_is_named(tmp_path, text, message):
     (tmp_path / "k.txt").write_text(text)
     np.savez(tmp_path / "n.npz", nodes=NODES, numbers=NUMBERS)
     with pytest.raises(GeometryFault, match=rf'stiffness file ".*k.txt".*{message}'):
-        elastic_body(MatrixSource(tmp_path / "k.txt", tmp_path / "n.npz"))
+        imported_body(tmp_path / "k.txt", tmp_path / "n.npz")
 
 
 @pytest.mark.parametrize(
@@ -282,4 +282,4 @@ def test_a_damaged_table_of_nodes_is_named(tmp_path, text, message):
     np.savez(tmp_path / "k.npz", K=STIFFNESS)
     (tmp_path / "n.csv").write_text(text)
     with pytest.raises(GeometryFault, match=rf'node file ".*n.csv".*{message}'):
-        elastic_body(MatrixSource(tmp_path / "k.npz", tmp_path / "n.csv"))
+        imported_body(tmp_path / "k.npz", tmp_path / "n.csv")

@@ -11,7 +11,7 @@ from scipy.sparse import linalg as sparse_linalg
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from tolcontact.elasticity import MeshSource, elastic_body, flexibility, responses
+from tolcontact.elasticity import flexibility, meshed_body, responses
 from tolcontact.elasticity.meshed_body import body_of
 from tolcontact.elasticity.tetrahedra import EDGES, Tetrahedra, shape_functions, stiffness_of
 from tolcontact.errors import GeometryFault
@@ -26,7 +26,7 @@ DENSITY, G = 7850.0, 9.81
 
 def box(size, element_size, poisson, density=None, young=E):
     mesh = trimesh.creation.box(bounds=[(0, 0, 0), size])
-    return elastic_body(MeshSource(np.array(mesh.vertices), np.array(mesh.faces), young, poisson, density, None, element_size))
+    return meshed_body(np.array(mesh.vertices), np.array(mesh.faces), young, poisson, density, None, element_size)
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +147,7 @@ def test_a_point_a_little_off_the_surface_acts_nearly_as_one_on_it(sheet, height
 
 def test_a_force_on_the_axis_of_a_hole_acts_on_its_wall():
     ring = trimesh.creation.annulus(10, 25, 8)
-    body = elastic_body(MeshSource(np.array(ring.vertices), np.array(ring.faces), E, 0.3))
+    body = meshed_body(np.array(ring.vertices), np.array(ring.faces), E, 0.3)
     forces = body.spread(np.array([[0.0, 0, 0]]), np.array([[1.0, 0, 0]]), 3.0).toarray().reshape(-1, 3)
     loaded = np.abs(forces).max(axis=1) > 1e-12
     assert np.hypot(*body.nodes[loaded, :2].T) == pytest.approx(10, rel=1e-2)
@@ -159,7 +159,7 @@ def test_a_hollow_body_is_meshed_with_its_cavity():
     outer, inner = trimesh.creation.icosphere(2, 20), trimesh.creation.icosphere(2, 12)
     inner.invert()
     hollow = trimesh.util.concatenate([outer, inner])
-    body = elastic_body(MeshSource(np.array(hollow.vertices), np.array(hollow.faces), E, 0.3, 1000.0))
+    body = meshed_body(np.array(hollow.vertices), np.array(hollow.faces), E, 0.3, 1000.0)
     assert body.mass == pytest.approx(hollow.volume * 1e-6, rel=1e-3)
 
 
@@ -167,7 +167,7 @@ def test_a_body_from_its_step_file_has_true_round_faces():
     """The cover of the models: the CAD kernel's triangles, within 2 um, have its volume; STL gives the same flexibility."""
     surface = shape(tc.Mesh(COVER))
     part = np.array(surface.vertices), np.array(surface.faces)
-    bodies = [elastic_body(MeshSource(*part, 70e3, 0.33, 2700, path, 6.0)) for path in (COVER, None)]
+    bodies = [meshed_body(*part, 70e3, 0.33, 2700, path, 6.0) for path in (COVER, None)]
     assert len(bodies[0].nodes) != len(bodies[1].nodes)
     points = np.array([(20, 20, 0), (100, 20, 0), (60, 60, 0), (60, 5, 0), (60, 75, 0)], dtype=float)
     balanced = np.linalg.svd(np.column_stack([np.ones(5), points[:, :2]]).T)[2][3:].T
@@ -242,7 +242,7 @@ def test_what_cannot_be_meshed_is_refused(change, message):
         mesh.vertices[8:] += [20, 0, 0]
     faces = np.array(mesh.faces)[1:] if change.pop("open", False) else np.array(mesh.faces)
     with pytest.raises(GeometryFault, match=message):
-        elastic_body(MeshSource(np.array(mesh.vertices), faces, **{"young": E, "poisson": 0.3, **change}))
+        meshed_body(np.array(mesh.vertices), faces, **{"young": E, "poisson": 0.3, **change})
 
 
 def test_without_the_extra_one_message_names_it(monkeypatch):

@@ -10,16 +10,13 @@ from tests.shapes import shape
 from tests.test_stored_coordinates import BOX
 from tolcontact.geometry.inset import inset
 from tolcontact.geometry.triangle_mesh import coordinate_error
-from tolcontact.interference import Neighbours, deviating_solid, solid
+from tolcontact.interference import Neighbours, solid
 from tolcontact.poses import AT_REST
 
 
 def test_the_test_of_interference_allows_the_error_and_no_more(tmp_path):
     lower, upper = (trimesh.creation.box(bounds=[(0, 0, z), (10, 10, z + 10)]).apply_translation(FAR) for z in (0, 10))
-    solids = [
-        deviating_solid(solid(shape(stored(mesh, tmp_path / f"{name}.stl"))), [], np.zeros(12))
-        for name, mesh in (("lower", lower), ("upper", upper))
-    ]
+    solids = [solid(shape(stored(mesh, tmp_path / f"{name}.stl"))) for name, mesh in (("lower", lower), ("upper", upper))]
     error = sum(coordinate_error(shape(tc.Mesh(tmp_path / f"{name}.stl"))) for name in ("lower", "upper"))
     X_BA = np.repeat(AT_REST[None], 3, axis=0)
     X_BA[:, 11] = [0.0, 0.9 * error, 2.5 * error]

@@ -6,8 +6,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.geometry.analytic_surfaces import Cylinder
-from tolcontact.interference import Neighbours, deviating_solid, solid
-from tolcontact.interference.free_region import InsetBody, free_region
+from tolcontact.interference import Neighbours, solid
+from tolcontact.interference.free_region import free_region
 
 INSETS = (4e-5, 6e-5)
 RADIUS, PIN, HALF, HEIGHT, SIDES = 4.05, 4.0, 2.0, 8.0, 90
@@ -55,12 +55,12 @@ def plate(half, *, varies):
     axis = np.array([0.0, 0.0, 1.0])
     ends = [Cylinder(np.array([x, 0.0, 0.0]), axis, radius=RADIUS) for x in {-half, half}]
     faces = [size_of(mesh, RADIUS, [0], -0.5)] if varies else []
-    return deviating_solid(mesh, faces, bulges, ends)
+    return mesh.deviating(faces, bulges, ends)
 
 
 def pin(*, low=0, varies=False):
     mesh = solid(tube(None, stadium(PIN, 0), low, HEIGHT))
-    return deviating_solid(mesh, [size_of(mesh, PIN, [1], 0.5)] if varies else [], np.zeros(len(mesh.faces)))
+    return mesh.deviating([size_of(mesh, PIN, [1], 0.5)] if varies else [], mesh.bulges)
 
 
 def poses(count, spread, tilt, rng):
@@ -122,15 +122,14 @@ def test_the_bottom_of_a_hole_is_a_half_space():
     cup = tube(stadium(RADIUS, 0), stadium(RADIUS + 6, 0), 0, HEIGHT)
     bottom = trimesh.creation.box(bounds=[[-9, -9, -3], [9, 9, -0.001]])
     outer, inner = solid(trimesh.util.concatenate([cup, bottom])), pin()
-    body = deviating_solid(outer, [], np.zeros(len(outer.faces)), plate(0.0, varies=False).cylinders)
-    region = free_region(InsetBody(body, body.inset(6e-5)), InsetBody(inner, inner.inset(4e-5)), is_forward=True)
+    body = outer.deviating([], outer.bulges, plate(0.0, varies=False).cylinders)
+    region = free_region(body.inset(6e-5), inner.inset(4e-5), is_forward=True)
     assert len(region.normals) == 1 and np.isfinite(region.levels).all()
     np.testing.assert_allclose(region.normals[0], [0, 0, -1], atol=1e-12)
     np.testing.assert_allclose(region.levels[0], 0.001 + 6e-5, atol=1e-9)
 
 
 def test_bodies_in_each_other_have_no_region():
-    ball, block = (solid(mesh) for mesh in (trimesh.creation.icosphere(2, 1.0), trimesh.creation.box((9, 9, 9))))
-    bodies = [deviating_solid(mesh, [], np.zeros(len(mesh.faces))) for mesh in (ball, block)]
+    bodies = [solid(mesh) for mesh in (trimesh.creation.icosphere(2, 1.0), trimesh.creation.box((9, 9, 9)))]
     for outer, inner in (bodies, bodies[::-1]):
-        assert free_region(InsetBody(outer, outer.inset(0.1)), InsetBody(inner, inner.inset(0.1)), is_forward=True) is None
+        assert free_region(outer.inset(0.1), inner.inset(0.1), is_forward=True) is None

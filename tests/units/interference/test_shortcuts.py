@@ -10,14 +10,12 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests.helpers import compiled
 from tests.units.interference.test_free_regions import INSETS, poses
-from tolcontact.interference.deviating_solid import deviating_solid
 from tolcontact.interference.neighbours import Neighbours
 from tolcontact.interference.solid import solid
 
 
 def body(*meshes):
-    closed = solid(trimesh.util.concatenate(meshes))
-    return deviating_solid(closed, [], np.zeros(len(closed.faces)))
+    return solid(trimesh.util.concatenate(meshes))
 
 
 def box(low, high):

@@ -4,8 +4,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from tolcontact.mechanics.displacement import moment_table, moments_about
-from tolcontact.mechanics.symmetric_products import congruent
+from tolcontact.mechanics.correction import moment_table, moments_about
+from tolcontact.mechanics.pose import congruent
 
 
 @pytest.mark.parametrize("share", [1.0, 0.4])

@@ -23,7 +23,7 @@ import numpy as np
 from tolcontact.child import Refusal
 from tolcontact.shape_worker import LOAD_KERNEL, Job
 from tolcontact.stored_coordinates import is_binary_stl, is_single, printed_spacing, single_spacing
-from tolcontact.system.resources import limit_resources
+from tolcontact.system.machine import limit_resources
 
 Arrays = dict[str, np.ndarray]
 ENCODING_GUESSERS = ("charset_normalizer", "chardet")  # trimesh would ask one for the encoding of binary content

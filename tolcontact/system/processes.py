@@ -1,9 +1,10 @@
-"""The watch over a child process: it ends a process that takes longer, or more memory, than it may.
+"""Child processes: the watch that ends one that takes longer, or more memory, than it may, and exit codes of others.
 
 A process limits its own memory and processor time where its system does (see `limit_resources`). Where it does not, its parent
 looks at what it has used: a library that reads a file may hold all threads of its own process.
 """
 
+import signal
 import subprocess
 import threading
 import time
@@ -11,11 +12,13 @@ from typing import Any, Self
 
 import lazy_loader
 
-from tolcontact.system.resources import ENFORCED
+from tolcontact.system.machine import ENFORCED
 
 psutil = lazy_loader.load("psutil")  # where the system sets no limits
 
 STALL_FACTOR = 10  # times the processor time: a process that lives longer does not wait for a processor, it hangs
+TIME_LIMIT = -signal.SIGXCPU if hasattr(signal, "SIGXCPU") else None  # exit code of a child at the end of its processor time
+WINDOWS_CRASH = 0xC0000000  # exit codes from here on are exceptions
 _IS_ENFORCED = ENFORCED >= {"time", "memory"}
 _INTERVAL = 0.1  # s between two looks
 
@@ -73,3 +76,11 @@ def run(command: list[str], *, memory: int, seconds: float, **options: Any) -> t
             process.kill()
             raise
     return process.returncode, output, errors, watch.limit
+
+
+def crash(code: int) -> str:
+    """Return the signal or the exception that crashed a process with an exit code; "" if it did not."""
+    if code < 0:
+        name = f", {signal.Signals(-code).name}" if -code in set(signal.Signals) else ""
+        return f"signal {-code}{name}"
+    return f"exception {code:#x}" if code >= WINDOWS_CRASH else ""
