@@ -195,11 +195,7 @@ class DatumFrame(NamedTuple):
 
 
 def datum_frame(
-    system: Sequence[Sequence[NominalFeature]],
-    centre: np.ndarray,
-    reach: float,
-    columns: int,
-    orientation_only: Sequence[bool],
+    system: Sequence[Sequence[NominalFeature]], centre: np.ndarray, reach: float, columns: int, orientation_only: Sequence[bool]
 ) -> DatumFrame:
     """Return the frame of datums in their precedence, for displacements about a `centre` (3,) [mm].
 

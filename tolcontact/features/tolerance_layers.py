@@ -50,10 +50,7 @@ def tolerance_layers(
 
 
 def _zone(
-    tolerance: GeometricTolerance,
-    pattern: NominalPattern,
-    system: Sequence[Sequence[NominalFeature]],
-    columns: int,
+    tolerance: GeometricTolerance, pattern: NominalPattern, system: Sequence[Sequence[NominalFeature]], columns: int
 ) -> tuple[tuple[np.ndarray, ...], DatumFrame, np.ndarray]:
     """Return the rows of a zone for each member, its datum frame, and the directions (coordinate, n) that it controls."""
     primary = system[0][0].geometry if system else None

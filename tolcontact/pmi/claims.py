@@ -7,13 +7,7 @@ import numpy as np
 
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.analytic_surfaces import are_opposed
-from tolcontact.geometry.brep_face import (
-    are_one_surface,
-    describe_faces,
-    faces_at,
-    faces_on_surfaces,
-    plain_vector,
-)
+from tolcontact.geometry.brep_face import are_one_surface, describe_faces, faces_at, faces_on_surfaces, plain_vector
 from tolcontact.geometry.face_groups import FaceOnSurface
 from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import FROM_PRODUCT, STATED_FACES, Shape
