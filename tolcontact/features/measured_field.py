@@ -27,7 +27,7 @@ from tolcontact.features.form_field import (
     scales_within,
     without_displacements,
 )
-from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
+from tolcontact.features.minimum_zone import minimum_widths
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
 from tolcontact.geometry.measured_points import measured_points
 from tolcontact.geometry.spreading import spread
@@ -279,7 +279,7 @@ def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> tuple
             "between or beside them; measure more points, also along the rim, or filter short waves out of the points"
         )
     rows = regression.associated.rows(feet)
-    return float(minimum_widths([ZoneMember(np.arange(len(feet)), rows)], values[None])[0]), lost
+    return float(minimum_widths([(np.arange(len(feet)), rows)], values[None])[0]), lost
 
 
 def _lengths(regression: HeightRegression, weights: np.ndarray) -> Lengths:

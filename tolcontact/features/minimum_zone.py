@@ -9,7 +9,6 @@ its `equidistant` system gives the centre with equal distances from its places, 
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -24,20 +23,14 @@ IDLE = 1e-6  # weight of a place without which the zone would be as wide
 PARALLEL = 1e-9  # of the largest height of a displacement: smaller ones are rounding
 
 
-class ZoneMember(NamedTuple):
-    """A part of a face that has a zone of its own: a whole surface, a circle, a line.
-
-    indices   (k,) of its places among the places of the face
-    rows      (k, freedom): heights of displacements and growths of the zone, each at most 1, the uniform one first
-    """
-
-    indices: np.ndarray
-    rows: np.ndarray
+# A part of a face that has a zone of its own, a whole surface, a circle or a line: the indices (k,) of its places on the face,
+# and heights (k, freedom) of displacements and growths of the zone, each at most 1, the uniform one first.
+ZoneMember = tuple[np.ndarray, np.ndarray]
 
 
 def minimum_widths(zone: Sequence[ZoneMember], heights: np.ndarray) -> np.ndarray:
     """Return the widths (n,) [mm] of the minimum zones of heights (n, place) [mm]: of the widest member each."""
-    return np.max([minimax(member.rows, heights[:, member.indices])[1] for member in zone], axis=0)
+    return np.max([minimax(rows, heights[:, indices])[1] for indices, rows in zone], axis=0)
 
 
 def minimax(rigid: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,7 @@
 """Tolerance kinds: the features that each kind of tolerance is for, its zone, and the form that it draws.
 
 A new kind is a row in `declaration/feature_tolerance.py` and a row of ZONES. A zone limits displacements of a feature; the
-datums of a tolerance leave some of these free (see tolerance_layers).
+datums of a tolerance leave some of these free (see nominal_pattern).
 
 A zone is a function of the tolerance, the feature, and the geometry of the first datum feature (None without datums). It
 returns rows (point, component, coordinate): inside the zone, no vector `rows[point] @ coordinates` exceeds half the width. It

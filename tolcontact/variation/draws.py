@@ -101,7 +101,6 @@ class Draws:
 
     contributors  the freedoms of the model with their spreads, in the order of the columns of deviations
     zones         that components of features fill
-    envelopes     of perfect form at maximum material, in which forms stay
     mean_widths   [mm] of the minimum zones of forms, by feature
     shifts        of datum planes, which follow from other deviations
     correlated    for each correlation its labels, and the lower factor of its matrix (Cholesky)
@@ -110,7 +109,9 @@ class Draws:
 
     def __init__(self, nominal: Nominal) -> None:
         self.contributors, self.zones, self.mean_widths = fill_zones(nominal)
-        self.envelopes = envelopes(nominal)
+        # Columns of sizes, and the columns that they scale by a factor: those of zones with a bonus, and of enveloped forms.
+        self._bonuses = [(np.unique(zone.sizes), zone.added, zone.scale) for zone in self.zones if zone.sizes is not None]
+        self._bonuses += [(np.array([one.size]), one.columns, one.scale) for one in envelopes(nominal)]
         self.shifts = [shift for pattern in nominal.patterns for shift in pattern.shifts]
         self._assembly = assembly = nominal.assembly
         self._column = {contributor.label: k for k, contributor in enumerate(self.contributors)}
@@ -221,11 +222,9 @@ class Draws:
     def _add_causes_and_bonuses(self, deviations: np.ndarray) -> None:
         """Add shared causes to sizes, scale components by the bonus of their sizes, and add shared causes to the rest."""
         measured = [column for columns, _ in self.populations for column in columns]
-        sizes = {int(size) for zone in self.zones if zone.sizes is not None for size in zone.sizes}
-        sizes |= {envelope.size for envelope in self.envelopes}
+        sizes = {int(size) for sizes, _, _ in self._bonuses for size in sizes}
         self._add_causes(deviations, lambda column: column in sizes)
-        scaled = [(zone.added, zone.scale) for zone in self.zones if zone.sizes is not None]
-        for columns, scale in scaled + [(envelope.columns, envelope.scale) for envelope in self.envelopes]:
+        for _, columns, scale in self._bonuses:
             deviations[:, np.setdiff1d(columns, measured)] *= scale(deviations)[:, None]  # measured parts have used their bonus
         self._add_causes(deviations, lambda column: column not in sizes)
 
@@ -243,8 +242,7 @@ class Draws:
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
         sets += [list(map(int, columns)) for columns, _ in self.populations]
         together = [[*shift.columns, *map(int, shift.sources)] for shift in self.shifts]
-        together += [sorted({*map(int, zone.sizes), *map(int, zone.added)}) for zone in self.zones if zone.sizes is not None]
-        together += [[envelope.size, *map(int, envelope.columns)] for envelope in self.envelopes]
+        together += [sorted({*map(int, sizes), *map(int, columns)}) for sizes, columns, _ in self._bonuses]
         # What follows from others by more than a sum also follows from the causes that drive them.
         followed = {column for columns in together for column in columns}
         of_causes = ([self._column[label] for label in (cause.name, *cause.drives)] for cause in self._assembly.variables)

@@ -62,7 +62,7 @@ def _widths(field: FormField) -> np.ndarray:
     if key not in _KNOWN_WIDTHS:
         stored = code_cache.load(key)
         if stored is None:
-            zone = [member._replace(rows=np.ascontiguousarray(member.rows)) for member in field.zone]
+            zone = [(indices, np.ascontiguousarray(rows)) for indices, rows in field.zone]
             stored = minimum_widths(zone, directions(field.modes)[:DIRECTIONS] @ heights.T).tobytes()
             code_cache.store(key, stored)
         _KNOWN_WIDTHS[key] = np.frombuffer(stored)
