@@ -21,9 +21,7 @@ DIGITS = 12  # of places [mm]: what is beyond is rounding
 SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with the face of its feature
 
 
-def locate(
-    scene: Assembly | Station, name: str, part: Part, fit: Fit, faces: Mapping[str, Face], seat: Face | None
-) -> None:  # fmt: skip
+def _locate(scene: Assembly | Station, name: str, part: Part, fit: Fit, faces: Mapping[str, Face], seat: Face | None) -> None:
     """Locate a fastener in the hole that holds it, or let it float: with its head on its seat, or held at an end alone.
 
     `faces` are the walls of its holes by label, from its head on.
@@ -35,7 +33,7 @@ def locate(
         ground = _feature_of(seat, f"{name} seat")
         scene.locate(part, list(_seat_locators(part, fit, fit.seat)), on=ground, floating=True)
     else:
-        first = next(iter(faces.values()))
+        first, *_ = faces.values()
         end = _locator(part, "end", fit.axis.at(fit.reach[1]), fit.axis.head)
         scene.locate(part, [end], on=first.part, floating=True)
 
@@ -45,8 +43,8 @@ def _hole_locators(part: Part, fit: Fit, hole: CylinderFeature) -> Iterator[Loca
     x, y = fit.axis.across
     low, high = fit.axis.extent(hole)
     for number, station in enumerate((low, high), start=1):
-        for letter, direction in (("x", x), ("y", y)):
-            yield _locator(part, f"{letter}{number}", fit.axis.at(station), direction)
+        yield _locator(part, f"x{number}", fit.axis.at(station), x)
+        yield _locator(part, f"y{number}", fit.axis.at(station), y)
     yield _locator(part, "end", fit.axis.at(low), fit.axis.head)
     # Within the material: on its surface, along which it points, it would look like a mistake (see tolcontact.plausibility).
     yield _locator(part, "turn", fit.axis.at((low + high) / 2) + fit.radius / 2 * x, y)
@@ -65,10 +63,10 @@ def _seat_locators(part: Part, fit: Fit, seat: PlaneFeature) -> Iterator[Locator
 
 def _locator(part: Part, name: str, point: np.ndarray, direction: np.ndarray, *, one_sided: bool = False) -> Locator:
     R, _ = placement_of(part)
-    return Locator(name, in_part(part, point), direction @ R, 0.0, one_sided=one_sided)
+    return Locator(name, _in_part(part, point), direction @ R, 0.0, one_sided=one_sided)
 
 
-def in_part(part: Part, point: np.ndarray) -> np.ndarray:
+def _in_part(part: Part, point: np.ndarray) -> np.ndarray:
     """Return a point (3,) of the nominal assembly in the frame of a part."""
     R, t = placement_of(part)
     return np.round((point - t) @ R, DIGITS) + 0.0
@@ -129,10 +127,10 @@ def fasten(
     Faults(f"{place}: {fault}" for fault in fit.faults(plane_face)).refuse(assembly.name)
     part = subject if isinstance(subject, Part) else _made_part(assembly, name, subject, fit)
     _declare_contacts(scene, name, fit.shank or _shank_face(part, fit), faces)
-    locate(scene, name, part, fit, faces, plane_face)
+    _locate(scene, name, part, fit, faces, plane_face)
     if pushed is not None:
         middle = fit.axis.at(sum(fit.reach) / 2)
-        scene.force(f"{name} push", at=part.point(*in_part(part, middle)), vector=pushed)
+        scene.force(f"{name} push", at=part.point(*_in_part(part, middle)), vector=pushed)
     return part
 
 
@@ -165,14 +163,11 @@ def _declare_contacts(scene: Assembly | Station, name: str, shank: Face, faces: 
     Parts before the last one are moving sides, so that contact may move them. The last one holds the fastener, or is the
     reference of it.
     """
+    *_, last = faces
     for label, face in faces.items():
-        pair = f"{name} in {face.part.name}"
-        if label == INTO:
-            continue
-        if face is list(faces.values())[-1]:
-            scene.contact(pair, moving=shank, reference=face)
-        else:
-            scene.contact(pair, moving=face, reference=shank)
+        if label != INTO:
+            moving, reference = (shank, face) if label == last else (face, shank)
+            scene.contact(f"{name} in {face.part.name}", moving=moving, reference=reference)
 
 
 def _check_types(scene: Any, name: str, fastener: Any, through: Any, into: Any, seat: Any) -> None:

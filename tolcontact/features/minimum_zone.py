@@ -43,7 +43,7 @@ def minimax(rigid: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndar
     signs = np.where(np.linalg.svd(shifted[initial].T)[2][-1] < 0, -1.0, 1.0)
     centres, widths = np.zeros((len(fields), rigid.shape[1])), np.zeros(len(fields))
     exact, rows = (np.ascontiguousarray(matrix.T) for matrix in (rigid, shifted))
-    exchange(fields, exact, rows, initial, signs, MAX_EXCHANGES, CLOSENESS, centres, widths)
+    exchange(fields, exact, rows, initial, signs, centres, widths)
     for row in np.flatnonzero(np.isnan(widths)):
         centres[row], widths[row] = _by_programme(rigid, fields[row])
     return centres, widths
@@ -87,7 +87,7 @@ def sum_modes(coefficients, modes, heights):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def exchange(heights, exact, rows, initial, initial_signs, limit, closeness, centres, widths):  # type: ignore[no-untyped-def]
+def exchange(heights, exact, rows, initial, initial_signs, centres, widths):  # type: ignore[no-untyped-def]
     """Write the minimum zone of each field of heights (n, place); NaN as its width where exchanges do not end.
 
     If several zones have that width, the centre is the one with the smallest sum of squared residuals.
@@ -96,8 +96,6 @@ def exchange(heights, exact, rows, initial, initial_signs, limit, closeness, cen
     rows           (freedom, place): the same for the search, which might cycle among collinear places
     initial        (freedom + 1,) indices of the places of the first reference
     initial_signs  (freedom + 1,) 1 or -1: the sides of the zone that they are on
-    limit          number of exchanges
-    closeness      share of the width: places that are no further out are in the zone
     centres        (n, freedom) displacements of the centre of the zone, written
     widths         (n,), written
     """
@@ -106,14 +104,14 @@ def exchange(heights, exact, rows, initial, initial_signs, limit, closeness, cen
     places, signs, residuals = np.empty(size, dtype=np.int64), np.empty(size), np.empty(heights.shape[1])
     for k in range(heights.shape[0]):
         places[:], signs[:], widths[k] = initial, initial_signs, np.nan
-        for _ in range(limit):
+        for _ in range(MAX_EXCHANGES):
             for c in range(size):
                 solution[c] = signs[c] * heights[k, places[c]]
             fill_equidistant(rows, places, signs, matrix)
             if not solve(matrix, solution):
                 break
             entering, largest = outermost(heights[k], rows, solution, residuals)
-            if abs(largest) <= solution[size - 1] * (1 + closeness) + 1e-300:
+            if abs(largest) <= solution[size - 1] * (1 + CLOSENESS) + 1e-300:
                 widths[k] = refine(heights[k], exact, rows, places, signs, matrix, solution, residuals, centres[k])
                 settle(heights[k], exact, places, signs, matrix, direction, residuals, widths[k] / 2, centres[k])
                 break

@@ -90,9 +90,8 @@ class Features:
                 freedoms.append(Freedom(f"{nominal.label}.size", FEATURE, declared.size.tolerance))
         form = None
         for member, nominal in recognized.items():
-            form = form_tolerance(declared, nominal.geometry)
-            shape = None if form is None else form_field_of(form, nominal.geometry, nominal.surfaces[0])
-            if shape is not None:
+            if form := form_tolerance(declared, nominal.geometry):
+                shape = form_field_of(form, nominal.geometry, nominal.surfaces[0])
                 first = start + len(freedoms)
                 recognized[member] = replace(nominal, form=shape, form_columns=range(first, first + shape.modes))
                 labels = [f"{nominal.label}.form {k:02d}" for k in range(1, shape.modes + 1)]

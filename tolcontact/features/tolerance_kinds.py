@@ -201,12 +201,9 @@ def form_tolerance(toleranced: Toleranced, feature: FeatureGeometry) -> Geometri
     return min(tolerances, key=lambda tolerance: tolerance.width, default=None)
 
 
-def form_field_of(tolerance: GeometricTolerance, feature: FeatureGeometry, face: Surface) -> FormField | None:
-    """Return the form field of a face by a tolerance; None for a tolerance without form. Raises GeometryFault."""
-    surface = analytic_surface(face)
-    if tolerance.form is None or surface is None:
-        return None
+def form_field_of(tolerance: GeometricTolerance, feature: FeatureGeometry, face: Surface) -> FormField:
+    """Return the form field of a face by the tolerance that draws its form (see form_tolerance). Raises GeometryFault."""
+    form, surface = tolerance.form, analytic_surface(face)
+    assert form is not None and surface is not None
     associated = FORMS[tolerance.of][type(feature)].of(surface, face)
-    if tolerance.form.measured is not None:
-        return measured_field(tolerance.form, tolerance.form.measured, face, associated)
-    return form_field(tolerance.form, face, associated)
+    return form_field(form, face, associated) if form.measured is None else measured_field(form, face, associated)
