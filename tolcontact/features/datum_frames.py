@@ -158,38 +158,6 @@ class DatumFrame(NamedTuple):
                 affects[shift.sources] = True
         return np.flatnonzero(affects)
 
-    def locked(self, compartment: Datums, J: np.ndarray, *, is_turned: bool) -> "DatumFrame":
-        """Return the frame after a further compartment of datums has taken the freedoms that affect it.
-
-        J           (coordinate, 6): coordinates of its datum features for unit displacements
-        is_turned   whether it is affected by rotations alone (ISO 5459, "><")
-        """
-        motion, free = self.motion, self.free
-        coordinates = np.vstack([padded(datum.coordinates, motion.shape[1]) for datum in compartment])
-        selection, jacobian, values = np.eye(len(J)), J, coordinates
-        if is_turned:
-            selection = scipy.linalg.null_space(J[:, :3].T, rcond=RANK_TOLERANCE)
-            jacobian, values = selection.T @ J, selection.T @ coordinates
-        U, S, Vt = np.linalg.svd(jacobian @ free)
-        largest = S.max(initial=0.0)
-        rank = int((S > MIN_EFFECT * max(largest, 1e-300)).sum()) if largest > MIN_EFFECT else 0
-        remaining = free @ Vt[rank:].T
-        if not rank:
-            return self._replace(free=remaining)
-        inverse = Vt[:rank].T @ (U[:, :rank] / S[:rank]).T
-        motion = motion + free @ inverse @ (values - jacobian @ motion)
-        shift = _datum_shift(compartment, coordinates - J @ motion, J @ free, is_turned=is_turned)
-        if shift is None:
-            return DatumFrame(motion, remaining, self.shifts)
-        moves = free @ inverse @ selection.T
-        if shift.form is None:
-            plane = compartment[0].geometry
-            assert isinstance(plane, PlaneFeature)
-            shift_motion = np.asarray(moves @ plane.values @ np.concatenate([plane.normal, np.zeros(3)]))[:, None]
-        else:
-            shift_motion = moves[:, shift.coordinates]
-        return DatumFrame(np.hstack([motion, shift_motion]), remaining, (*self.shifts, shift))
-
 
 def datum_frame(
     system: Sequence[Datums], centre: np.ndarray, reach: float, columns: int, orientation_only: Sequence[bool]
@@ -201,11 +169,29 @@ def datum_frame(
     `reach` [mm]. Compartments that are `orientation_only` lock no translations.
     """
     to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
-    frame = DatumFrame(np.zeros((6, columns)), np.eye(6), ())
+    motion, free, shifts = np.zeros((6, columns)), np.eye(6), list[DatumShift]()
     for compartment, is_turned in zip(system, orientation_only, strict=True):
         J = np.vstack([datum.geometry.about(centre) for datum in compartment]) @ to_twist
-        frame = frame.locked(compartment, J, is_turned=is_turned)
-    return DatumFrame(to_twist @ frame.motion, to_twist @ frame.free, frame.shifts)
+        coordinates = np.vstack([padded(datum.coordinates, motion.shape[1]) for datum in compartment])
+        selection, jacobian, values = np.eye(len(J)), J, coordinates
+        if is_turned:
+            selection = scipy.linalg.null_space(J[:, :3].T, rcond=RANK_TOLERANCE)
+            jacobian, values = selection.T @ J, selection.T @ coordinates
+        U, S, Vt = np.linalg.svd(jacobian @ free)
+        largest = S.max(initial=0.0)
+        rank = int((S > MIN_EFFECT * max(largest, 1e-300)).sum()) if largest > MIN_EFFECT else 0
+        if rank:
+            moves = free @ (Vt[:rank].T @ (U[:, :rank] / S[:rank]).T)
+            motion = motion + moves @ (values - jacobian @ motion)
+            if shift := _datum_shift(compartment, coordinates - J @ motion, J @ free, is_turned=is_turned):
+                moves, plane = moves @ selection.T, compartment[0].geometry
+                shift_motion = moves[:, shift.coordinates]
+                if shift.form is None and isinstance(plane, PlaneFeature):
+                    shift_motion = (moves @ plane.values @ np.concatenate([plane.normal, np.zeros(3)]))[:, None]
+                motion = np.hstack([motion, shift_motion])
+                shifts.append(shift)
+        free = free @ Vt[rank:].T
+    return DatumFrame(to_twist @ motion, to_twist @ free, tuple(shifts))
 
 
 def _datum_shift(compartment: Datums, residuals: np.ndarray, tilts: np.ndarray, *, is_turned: bool) -> DatumShift | None:

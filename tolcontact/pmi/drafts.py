@@ -22,15 +22,7 @@ from tolcontact.features.nominal_pattern import unlike_members
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
-from tolcontact.pmi.claims import (
-    Claim,
-    Place,
-    TolerancedSurfaces,
-    Undeclared,
-    claims_of,
-    declared_size,
-    declared_tolerance,
-)  # fmt: skip
+from tolcontact.pmi.claims import Claim, Place, TolerancedSurfaces, Undeclared, claims_of, declared_size, declared_tolerance
 
 Statement = tuple[Claim, Control]
 
