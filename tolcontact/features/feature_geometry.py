@@ -202,9 +202,3 @@ class GeneralFeature(FeatureGeometry):
             return "a general surface"
         deviation = f"is off by up to {self.nearest.residual:.2g} mm, more than {FIT_TOLERANCE:g}"
         return f"a general surface (the nearest {self.nearest.kind} {deviation})"
-
-
-def target_point(point: np.ndarray, normal: np.ndarray) -> FeatureGeometry:
-    """Return the geometry of a datum target: a point (3,) [mm] of a face, which moves along an outward unit normal (3,)."""
-    row = np.concatenate([normal, np.zeros(3)])[None]
-    return FeatureGeometry(point, ("height",), row.T, row, (point[None], normal[None, None]))

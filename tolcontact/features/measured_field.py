@@ -173,9 +173,9 @@ def _batches(scans: Sequence[Scan]) -> list[tuple[np.ndarray, np.ndarray]]:
 def measured_field(form: Form, face: Surface, associated: AssociatedSurface) -> FormField:
     """Return the form field of faces whose points are in files, in the frame of their part. Raises GeometryFault."""
     assert form.measured is not None
-    form = replace(form, covariance=COVARIANCE)
+    clouds, form = measured_points(form.measured), replace(form, covariance=COVARIANCE)
     everywhere = associated.surface.project(spread(face.mesh, STATIONS[0], None))
-    scans = [_scan(cloud, str(path), face, everywhere, associated) for path, cloud in measured_points(form.measured).items()]
+    scans = [_scan(cloud, str(path), face, everywhere, associated) for path, cloud in clouds.items()]
     regression = HeightRegression.of(form, face, associated, scans)
     scans = regression.samples(scans)
     weights = regression.weights(scans)

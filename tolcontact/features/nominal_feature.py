@@ -8,7 +8,7 @@ import numpy as np
 from tolcontact.declaration import Feature
 from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import placed_twist
-from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature, target_point
+from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature
 from tolcontact.features.form_field import FormField
 from tolcontact.geometry.faces import FaceArea
 from tolcontact.geometry.surface import Surface
@@ -180,7 +180,9 @@ class NominalFeature:
         deviation = self.deviation(index, (np.eye(3), np.zeros(3)))
         coordinates = np.zeros((1, self.coordinates.shape[1]))
         coordinates[:, deviation.columns] = deviation.outward(position[None], normal[None])
-        return replace(self, geometry=target_point(position, normal), coordinates=coordinates, form=None, form_columns=range(0))
+        row = np.concatenate([normal, np.zeros(3)])[None]
+        geometry = FeatureGeometry(position, ("height",), row.T, row, (position[None], normal[None, None]))
+        return replace(self, geometry=geometry, coordinates=coordinates, form=None, form_columns=range(0))
 
     def deviation(self, index: int | None, placement: Placement) -> FaceDeviation:
         """Return how a face deviates in a part at `placement`; with `index` None the centre, which no size moves."""

@@ -204,7 +204,13 @@ def _fill_layers(
             zone = ComponentZone(
                 columns[components], np.concatenate(rows), middles[components], tolerance.width, columns[added], width
             )
-            yield zone if not tolerance.material else _with_bonus(zone, pattern, members, group, tolerance.material)
+            sizes = [pattern.members[k].size_column for k in group]
+            if tolerance.material and pattern.declared.size is not None and None not in sizes:
+                # The zone grows as the sizes of its members depart from the material limit.
+                limit, growth = _departure(pattern.members[group[0]], pattern.declared.size, tolerance.material)
+                size_of_point = np.repeat(np.array(sizes, dtype=int), [len(members[k].rows) for k in group])
+                zone = replace(zone, sizes=size_of_point, limit=limit, growth=growth)
+            yield zone
             if tolerance.cpk is not None:
                 means[added[:1] - inner_count] += SIDES[tolerance.side] * (3 * spread * (1 - tolerance.cpk / tolerance.cp))
                 lots[added[:1] - inner_count] = lot_score(tolerance)
@@ -260,16 +266,3 @@ def _groups(members: Sequence[MemberZone]) -> Iterator[tuple[np.ndarray, np.ndar
     for label in range(labels.max() + 1):
         group = np.flatnonzero(labels == label)
         yield group, np.flatnonzero(moved[group].any(axis=0))
-
-
-def _with_bonus(
-    zone: ComponentZone, pattern: NominalPattern, members: Sequence[MemberZone], group: np.ndarray, material: str
-) -> ComponentZone:
-    """Return the zone of a group of members that grows as their sizes depart from the material limit, "M" or "L"."""
-    size = pattern.declared.size
-    columns = [pattern.members[k].size_column for k in group]
-    if size is None or None in columns:
-        return zone
-    limit, growth = _departure(pattern.members[group[0]], size, material)
-    sizes = np.repeat(np.array(columns, dtype=int), [len(members[k].rows) for k in group])
-    return replace(zone, sizes=sizes, limit=limit, growth=growth)
