@@ -20,7 +20,7 @@ from tolcontact.statistics import capability, intervals, two_samples
 from tolcontact.statistics.linear_shares import linear_shares, required_realizations
 from tolcontact.statistics.sample import Sample
 from tolcontact.statistics.sobol_indices import sobol_indices
-from tolcontact.variation.plans import Plan
+from tolcontact.variation.plans import planned_numbers
 from tolcontact.vocabulary import LATIN_HYPERCUBE, REPLICATE, SOBOL
 
 README = Path(__file__).with_name("README.md")
@@ -167,7 +167,7 @@ def coverage_of_plan(plan, name, repeats):
     """Return the coverage of the figures of a run with a sampling plan: a function of the sum of three contributors."""
 
     def draw(seed):
-        numbers = Plan(plan, ["a", "b", "c"]).numbers(seed, 0, REPLICATES * REPLICATE)
+        numbers = planned_numbers(plan, ["a", "b", "c"], seed, 0, REPLICATES * REPLICATE)
         score = sum(special.ndtri(numbers(label)) for label in "abc") / np.sqrt(3)
         return QUANTILES[name](special.ndtr(score))[None]
 

@@ -24,8 +24,7 @@ from tolcontact.geometry import bodies_in, faces_in, group_lines
 from tolcontact.geometry.listing import FacesOfRecords
 from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
 from tolcontact.pmi.claims import Annotation
-from tolcontact.pmi.declared import DeclaredFile, declared_file
-from tolcontact.pmi.script import script
+from tolcontact.pmi.declared import DeclaredFile, declared_file, script
 from tolcontact.report.table import FILE_WIDTH
 from tolcontact.texts import clipped, csv_cell, shown, shown_name
 
@@ -72,12 +71,12 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_scrip
 def _declared(file: Path, information: Pmi) -> DeclaredFile:
     """Return how features declare the annotations of a file; nothing, with a warning, if its shapes cannot be read."""
     if information.is_empty:
-        return DeclaredFile(information, (), (), {})
+        return DeclaredFile((), (), information, (), {})
     try:
         declared = declared_file(file, information)
     except OptionError as error:
         echo(f"warning: nothing is declared, and faces have no numbers: {error}", err=True)
-        return DeclaredFile(information, (), (), {})
+        return DeclaredFile((), (), information, (), {})
     for fault in declared.faults:
         echo(f"warning: nothing is declared of {fault}", err=True)
     return declared

@@ -18,7 +18,7 @@ from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import CountedRegion, counted_regions, point_weights
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
-from tolcontact.features.zone_kernel import sum_modes
+from tolcontact.features.minimum_zone import sum_modes
 from tolcontact.geometry.overlap import points_on_rim
 from tolcontact.geometry.surface import Surface
 

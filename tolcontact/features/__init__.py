@@ -10,8 +10,7 @@ from tolcontact.features.form_field import FormField
 from tolcontact.features.freedoms import Freedom
 from tolcontact.features.nominal_feature import Expansion, FaceDeviation, NominalFeature, Placement
 from tolcontact.features.nominal_features import Features
-from tolcontact.features.nominal_pattern import Layer, NominalPattern
-from tolcontact.features.tolerance_layers import uncontrolled
+from tolcontact.features.nominal_pattern import Layer, NominalPattern, uncontrolled
 
 __all__ = [
     "AxisFeature", "DatumShift", "Expansion", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField",

@@ -2,21 +2,31 @@
 
 A flatness or a cylindricity limits a face as a whole, free of displacements and sizes of its surface. A roundness limits each
 section, free of its position and diameter, and a straightness each line, free of its position and slope.
+
+The heights of two points have a covariance by their distance in correlation lengths. The variance is 1. With a number of lobes,
+heights vary around the axis of the face as a cosine, and by the distance along the axis.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
+import scipy
 
+from tolcontact.declaration.size import Form
 from tolcontact.errors import GeometryFault
-from tolcontact.features.covariances import Lengths
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, azimuths
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import ON_FACE
 from tolcontact.geometry.triangle_mesh import quadrature
 
+# Of fields that are very smooth, twice and once differentiable.
+COVARIANCES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "squared exponential": lambda distance: np.exp(-(distance**2) / 2),
+    "matern 5/2": lambda distance: (1 + (scaled := np.sqrt(5) * distance) + scaled**2 / 3) * np.exp(-scaled),
+    "matern 3/2": lambda distance: (1 + (scaled := np.sqrt(3) * distance)) * np.exp(-scaled),
+}
 PLACE_SPACING = 1 / 4  # of the correlation length
 MIN_PLACES, MAX_PLACES = 600, 20_000  # of a face, over which areas are summed
 MAX_EXCESS = 8  # times the intended number of places
@@ -28,6 +38,27 @@ NODES = 16  # of a line
 MIN_LENGTH = 1e-9  # of a displacement, relative to the largest
 START = 0.01  # rad before the first line, where no other line is: azimuths are counted from here
 TERMS = 7  # of the displacement of a surface: its growth, then a translation and a rotation
+
+
+class Lengths(NamedTuple):
+    """The correlation lengths [mm] of a form: across the axis of its surface, and along it."""
+
+    across: float
+    along: float
+
+
+def covariance(form: Form, lengths: Lengths, surface: AnalyticSurface, points: np.ndarray, stations: np.ndarray) -> np.ndarray:
+    """Return the covariance (point, station) of points (point, 3) and stations (station, 3) [mm] of a surface."""
+    decay = COVARIANCES[form.covariance]
+    if form.lobes is None:
+        stretch = (1 / lengths.along - 1 / lengths.across) * np.outer(surface.axis, surface.axis)
+        scaled = [places / lengths.across + places @ stretch for places in (points, stations)]
+        return decay(scipy.spatial.distance.cdist(*scaled))
+    (arms, along), (station_arms, station_along) = (surface.around_axis(places)[1:] for places in (points, stations))
+    cosines = np.einsum("pk,sk->ps", arms, station_arms)
+    lobes = np.cos(form.lobes * np.arccos(cosines.clip(-1.0, 1.0)))
+    return np.asarray(lobes * decay(np.abs(along[:, None] - station_along) / lengths.along))
+
 
 Places = tuple[np.ndarray, np.ndarray]  # places (place, 3) [mm] of a face, and their areas (place,) as weights
 

@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
+from scipy.linalg import block_diag
 
 from tolcontact.declaration import OUTSIDE, DatumTargets, Feature, Part, Pattern
 from tolcontact.features.feature_geometry import PlaneFeature
 from tolcontact.features.form_field import FormField
-from tolcontact.features.minimum_zone import minimax
-from tolcontact.features.nominal_feature import NominalFeature
-from tolcontact.features.zone_kernel import sum_modes
+from tolcontact.features.minimum_zone import minimax, sum_modes
+from tolcontact.features.nominal_feature import NominalFeature, padded
 from tolcontact.geometry.tolerances import MIN_PART
 
 FIELDS_AT_ONCE = 512
@@ -25,6 +25,7 @@ MIN_DIRECTION = 1e-9  # of the largest tilt that a datum system leaves to a plan
 MIN_EFFECT = 1e-4  # smallest singular value, relative to the largest, of a displacement that affects a datum
 MIN_SHIFT = 1e-9  # mm of a datum or a feature, per unit deviation
 RANK_TOLERANCE = 1e-4  # smallest singular value of an independent direction: shapes of single precision are no better
+Datums = Sequence[NominalFeature]  # of one compartment of a datum system
 Declared = Feature | Pattern | DatumTargets
 Shifts = dict[tuple[object, bytes], np.ndarray]  # coordinates (row, 3) of planes that are already computed
 
@@ -104,7 +105,7 @@ class DatumShift:
         Other features may refer to the same datum: its planes are added to those `computed` before.
         """
         if self.form is None:
-            return self._largest_heights(deviations)
+            return _summed(deviations, self.extremes).max(axis=1)[:, None]
         residuals = _summed(deviations, self.residuals)
         key = (self.form, residuals.tobytes() + self.free.tobytes())
         if key not in computed:
@@ -117,14 +118,10 @@ class DatumShift:
         ends = np.stack([rows * bound[: rows.shape[1]] for bound in (lower, upper)])
         return float(ends.min(axis=0).sum(axis=1).max()), float(ends.max(axis=0).sum(axis=1).max())
 
-    def _largest_heights(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the largest height (row, 1) [mm] of the extremes of the plane."""
-        return _summed(deviations, self.extremes).max(axis=1)[:, None]
-
     def _minimax_planes(self, form: FormField, deviations: np.ndarray, residuals: np.ndarray) -> np.ndarray:
         """Return the coordinates (row, 3) [mm] of the planes that touch faces with `residuals` (row, 3) [mm]."""
         coordinates = np.zeros((len(deviations), 3))
-        coordinates[:, :1] = self._largest_heights(deviations)
+        coordinates[:, 0] = _summed(deviations, self.extremes).max(axis=1)
         coefficients = deviations[:, self.datum.form_columns.start : self.datum.form_columns.stop]
         with_form = np.flatnonzero(coefficients.any(axis=1))
         rows, planes = np.ascontiguousarray(self.heights.T), self.heights @ self.free
@@ -161,45 +158,9 @@ class DatumFrame(NamedTuple):
                 affects[shift.sources] = True
         return np.flatnonzero(affects)
 
-    def locked(self, compartment: Sequence[NominalFeature], J: np.ndarray, *, is_turned: bool) -> "DatumFrame":
-        """Return the frame after a further compartment of datums has taken the freedoms that affect it.
-
-        J           (coordinate, 6): coordinates of its datum features for unit displacements
-        is_turned   whether it is affected by rotations alone (ISO 5459, "><")
-        """
-        motion, free = self.motion, self.free
-        coordinates = np.vstack([padded(datum.coordinates, motion.shape[1]) for datum in compartment])
-        selection, jacobian, values = np.eye(len(J)), J, coordinates
-        if is_turned:
-            selection = scipy.linalg.null_space(J[:, :3].T, rcond=RANK_TOLERANCE)
-            jacobian, values = selection.T @ J, selection.T @ coordinates
-        U, S, Vt = np.linalg.svd(jacobian @ free)
-        largest = S.max(initial=0.0)
-        rank = int((S > MIN_EFFECT * max(largest, 1e-300)).sum()) if largest > MIN_EFFECT else 0
-        remaining = free @ Vt[rank:].T
-        if not rank:
-            return self._replace(free=remaining)
-        inverse = Vt[:rank].T @ (U[:, :rank] / S[:rank]).T
-        motion = motion + free @ inverse @ (values - jacobian @ motion)
-        shift = _datum_shift(compartment, coordinates - J @ motion, J @ free, is_turned=is_turned)
-        if shift is None:
-            return DatumFrame(motion, remaining, self.shifts)
-        moves = free @ inverse @ selection.T
-        if shift.form is None:
-            plane = compartment[0].geometry
-            assert isinstance(plane, PlaneFeature)
-            shift_motion = np.asarray(moves @ plane.values @ np.concatenate([plane.normal, np.zeros(3)]))[:, None]
-        else:
-            shift_motion = moves[:, shift.coordinates]
-        return DatumFrame(np.hstack([motion, shift_motion]), remaining, (*self.shifts, shift))
-
 
 def datum_frame(
-    system: Sequence[Sequence[NominalFeature]],
-    centre: np.ndarray,
-    reach: float,
-    columns: int,
-    orientation_only: Sequence[bool],
+    system: Sequence[Datums], centre: np.ndarray, reach: float, columns: int, orientation_only: Sequence[bool]
 ) -> DatumFrame:
     """Return the frame of datums in their precedence, for displacements about a `centre` (3,) [mm].
 
@@ -208,16 +169,32 @@ def datum_frame(
     `reach` [mm]. Compartments that are `orientation_only` lock no translations.
     """
     to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
-    frame = DatumFrame(np.zeros((6, columns)), np.eye(6), ())
+    motion, free, shifts = np.zeros((6, columns)), np.eye(6), list[DatumShift]()
     for compartment, is_turned in zip(system, orientation_only, strict=True):
         J = np.vstack([datum.geometry.about(centre) for datum in compartment]) @ to_twist
-        frame = frame.locked(compartment, J, is_turned=is_turned)
-    return DatumFrame(to_twist @ frame.motion, to_twist @ frame.free, frame.shifts)
+        coordinates = np.vstack([padded(datum.coordinates, motion.shape[1]) for datum in compartment])
+        selection, jacobian, values = np.eye(len(J)), J, coordinates
+        if is_turned:
+            selection = scipy.linalg.null_space(J[:, :3].T, rcond=RANK_TOLERANCE)
+            jacobian, values = selection.T @ J, selection.T @ coordinates
+        U, S, Vt = np.linalg.svd(jacobian @ free)
+        largest = S.max(initial=0.0)
+        rank = int((S > MIN_EFFECT * max(largest, 1e-300)).sum()) if largest > MIN_EFFECT else 0
+        if rank:
+            moves = free @ (Vt[:rank].T @ (U[:, :rank] / S[:rank]).T)
+            motion = motion + moves @ (values - jacobian @ motion)
+            if shift := _datum_shift(compartment, coordinates - J @ motion, J @ free, is_turned=is_turned):
+                moves, plane = moves @ selection.T, compartment[0].geometry
+                shift_motion = moves[:, shift.coordinates]
+                if shift.form is None and isinstance(plane, PlaneFeature):
+                    shift_motion = (moves @ plane.values @ np.concatenate([plane.normal, np.zeros(3)]))[:, None]
+                motion = np.hstack([motion, shift_motion])
+                shifts.append(shift)
+        free = free @ Vt[rank:].T
+    return DatumFrame(to_twist @ motion, to_twist @ free, tuple(shifts))
 
 
-def _datum_shift(
-    compartment: Sequence[NominalFeature], residuals: np.ndarray, tilts: np.ndarray, *, is_turned: bool
-) -> DatumShift | None:
+def _datum_shift(compartment: Datums, residuals: np.ndarray, tilts: np.ndarray, *, is_turned: bool) -> DatumShift | None:
     """Return the shift of the plane of a compartment from its least-squares plane; None if there is none.
 
     residuals   (coordinate, column): coordinates of the features relative to their datum, per unit deviation
@@ -232,17 +209,9 @@ def _datum_shift(
     extremes = geometry.rows(geometry.extremes)[:, 0] @ residuals
     if datum.form is None and (is_turned or np.abs(extremes).max(initial=0.0) <= MIN_SHIFT):
         return None
-    return DatumShift(datum, extremes, residuals, _free_coordinates(tilts[1:]), (0,) if datum.form is None else (0, 1, 2))
-
-
-def _free_coordinates(tilts: np.ndarray) -> np.ndarray:
-    """Return the free coordinates (3, freedom) of a plane with `tilts` (2, n): its offset, and independent tilts."""
-    U, S, _ = np.linalg.svd(tilts, full_matrices=False)
-    spanned = U[:, S > MIN_DIRECTION * max(S.max(initial=0.0), 1.0)]
-    free = np.zeros((3, 1 + spanned.shape[1]))
-    free[0, 0] = 1.0
-    free[1:, 1:] = spanned
-    return free
+    U, S, _ = np.linalg.svd(tilts[1:], full_matrices=False)
+    independent = U[:, S > MIN_DIRECTION * max(S.max(initial=0.0), 1.0)]
+    return DatumShift(datum, extremes, residuals, block_diag(1.0, independent), (0,) if datum.form is None else (0, 1, 2))
 
 
 def _summed(deviations: np.ndarray, factors: np.ndarray) -> np.ndarray:
@@ -253,13 +222,6 @@ def _summed(deviations: np.ndarray, factors: np.ndarray) -> np.ndarray:
     return sums
 
 
-def padded(coordinates: np.ndarray, columns: int) -> np.ndarray:
-    """Return coordinates (coordinate, column) with zeros for the columns after theirs."""
-    result = np.zeros((len(coordinates), columns))
-    result[:, : coordinates.shape[1]] = coordinates
-    return result
-
-
 def datum_order(part: Part) -> tuple[list[Declared], list[Declared]]:
     """Return what is declared of a part, each after its datums, and those whose datums refer to each other in a circle."""
     remaining: list[Declared] = [*part.toleranced, *part.targets]
@@ -267,10 +229,7 @@ def datum_order(part: Part) -> tuple[list[Declared], list[Declared]]:
     while ready := [declared for declared in remaining if _references(declared) <= present]:
         ordered += ready
         for declared in ready:
-            if isinstance(declared, DatumTargets):
-                present.add(declared.letter)
-            else:
-                present.update([declared.datum, *declared.members])
+            present |= {declared.letter} if isinstance(declared, DatumTargets) else {declared.datum, *declared.members}
         remaining = [declared for declared in remaining if declared not in ready]
     return ordered, remaining
 
@@ -279,5 +238,5 @@ def _references(declared: Declared) -> set[str | Feature]:
     """Return the letters of datums and the features that a declaration refers to."""
     if isinstance(declared, DatumTargets):
         return set(declared.features)
-    letters = {letter for tolerance in declared.geometric for compartment in tolerance.system for letter in compartment}
+    letters = {letter for tolerance in declared.geometric for letter in tolerance.letters}
     return {*letters, *(declared.borrowed if isinstance(declared, Pattern) else ())}

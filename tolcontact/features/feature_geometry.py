@@ -61,8 +61,9 @@ class FeatureGeometry:
     def about(self, centre: np.ndarray) -> np.ndarray:
         """Return `values` (coordinate, 6) for displacements with rotations about another centre (3,)."""
         # x -> tau + rho x (x - centre) is x -> tau' + rho x (x - c), c = self.centre, with tau' = tau + rho x (c - centre).
+        x, y, z = self.centre - centre
         shift = np.eye(6)
-        shift[:3, 3:] = -_cross_matrix(self.centre - centre)
+        shift[:3, 3:] = -np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         return self.values @ shift
 
     def end(self, number: int) -> np.ndarray:
@@ -199,17 +200,5 @@ class GeneralFeature(FeatureGeometry):
     def in_words(self) -> str:
         if self.nearest is None:
             return "a general surface"
-        deviation = (
-            f"the nearest {self.nearest.kind} is off by up to {self.nearest.residual:.2g} mm, more than {FIT_TOLERANCE:g}"
-        )
-        return f"a general surface ({deviation})"
-
-
-def target_point(point: np.ndarray, normal: np.ndarray) -> FeatureGeometry:
-    """Return the geometry of a datum target: a point (3,) [mm] of a face, which moves along an outward unit normal (3,)."""
-    row = np.concatenate([normal, np.zeros(3)])[None]
-    return FeatureGeometry(point, ("height",), row.T, row, (point[None], normal[None, None]))
-
-
-def _cross_matrix(v: np.ndarray) -> np.ndarray:
-    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+        deviation = f"is off by up to {self.nearest.residual:.2g} mm, more than {FIT_TOLERANCE:g}"
+        return f"a general surface (the nearest {self.nearest.kind} {deviation})"

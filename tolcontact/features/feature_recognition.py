@@ -40,11 +40,16 @@ def feature_geometry(faces: Sequence[Surface]) -> FeatureGeometry:
     face, surface = faces[0], surfaces[0]
     match surface:
         case Plane():
-            return _plane(face, surface)
+            coordinates = _plane_coordinates(surface.origin, surface.axis, np.asarray(face.mesh.vertices))
+            return PlaneFeature(*coordinates, normal=surface.axis)
         case Sphere():
-            return _sphere(face, surface)
+            twists, extremes = np.vstack([AXES, np.zeros((3, 3))]), (surface.origin[None], AXES[None])
+            coordinates = surface.origin, ("shift x", "shift y", "shift z"), twists, twists.T, extremes
+            return SphereFeature(*coordinates, size=2 * surface.radius, is_inner=face.pieces[0].is_hollow)
         case Cylinder():
-            return _cylinder(face, surface)
+            coordinates, axis, half = _axis_coordinates(face, surface)
+            is_inner = face.pieces[0].is_hollow
+            return CylinderFeature(*coordinates, axis=axis, half=half, size=2 * surface.radius, is_inner=is_inner)
         case Cone():
             return _cone(face, surface)
         case _:
@@ -74,17 +79,6 @@ def analytic_surface(face: Surface) -> AnalyticSurface | None:
     return None
 
 
-def _sphere(face: Surface, sphere: Sphere) -> SphereFeature:
-    twists, extremes = np.vstack([AXES, np.zeros((3, 3))]), (sphere.origin[None], AXES[None])
-    coordinates = sphere.origin, ("shift x", "shift y", "shift z"), twists, twists.T, extremes
-    return SphereFeature(*coordinates, size=2 * sphere.radius, is_inner=face.pieces[0].is_hollow)
-
-
-def _plane(face: Surface, plane: Plane) -> PlaneFeature:
-    coordinates = _plane_coordinates(plane.origin, plane.axis, np.asarray(face.mesh.vertices))
-    return PlaneFeature(*coordinates, normal=plane.axis)
-
-
 def _slab(faces: Sequence[Surface], surfaces: Sequence[AnalyticSurface | None]) -> SlabFeature:
     first_plane, second_plane = surfaces
     if not (isinstance(first_plane, Plane) and isinstance(second_plane, Plane)):
@@ -107,7 +101,11 @@ def _plane_coordinates(place: np.ndarray, n: np.ndarray, points: np.ndarray) -> 
     Tilts are measured at the edges of the smallest rectangle around the points.
     """
     u, v, names = _directions_across(n)
-    corners = _hull(np.column_stack([points @ u, points @ v]))
+    projected = np.column_stack([points @ u, points @ v])
+    try:
+        corners = projected[ConvexHull(projected).vertices]
+    except QhullError as error:
+        raise GeometryFault("its face is so narrow that it has no area") from error
     angle = _rectangle_angle(corners)
     if angle:
         u, v = np.cos(angle) * u + np.sin(angle) * v, np.cos(angle) * v - np.sin(angle) * u
@@ -135,12 +133,6 @@ def _turned(corners: np.ndarray, angle: float) -> np.ndarray:
     """Return coordinates (corner, 2) along axes that are rotated by an angle [rad]."""
     cos, sin = np.cos(angle), np.sin(angle)
     return corners @ np.array([[cos, -sin], [sin, cos]])
-
-
-def _cylinder(face: Surface, cylinder: Cylinder) -> CylinderFeature:
-    coordinates, axis, half = _axis_coordinates(face, cylinder)
-    is_inner = face.pieces[0].is_hollow
-    return CylinderFeature(*coordinates, axis=axis, half=half, size=2 * cylinder.radius, is_inner=is_inner)
 
 
 def _cone(face: Surface, cone: Cone) -> ConeFeature:
@@ -184,7 +176,9 @@ def _general(face: Surface) -> GeneralFeature:
     centre = np.asarray(mesh.area_faces @ mesh.triangles_center / mesh.area_faces.sum())
     reach = float(np.linalg.norm(points - centre, axis=1).max())
     moved = np.hstack([normals, np.cross(points - centre, normals) / reach])  # along normals, for (tau, rho reach) of 1
-    freedoms = _normal_displacements(moved, _simple_displacements(face))
+    mean_normal = mesh.area_faces @ mesh.face_normals
+    length = np.linalg.norm(mean_normal)
+    freedoms = _normal_displacements(moved, mean_normal / length if length > 1e-9 * mesh.area else AXES[2])
     to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
     metric = moved.T @ moved
     values = np.linalg.solve(freedoms.T @ metric @ freedoms, freedoms.T @ metric) @ np.linalg.inv(to_twist)
@@ -196,25 +190,18 @@ def _general(face: Surface) -> GeneralFeature:
     return GeneralFeature(*coordinates, nearest=nearest_surface(np.asarray(mesh.triangles)))
 
 
-def _simple_displacements(face: Surface) -> list[np.ndarray]:
-    """Return six displacements (tau, rho): along and across the mean normal, then rotations about these."""
-    mesh = face.mesh
-    mean_normal = mesh.area_faces @ mesh.face_normals
-    length = np.linalg.norm(mean_normal)
-    n = mean_normal / length if length > 1e-9 * mesh.area else AXES[2]
-    u, v, _ = _directions_across(n)
-    zero = np.zeros(3)
-    return [np.concatenate([e, zero]) for e in (n, u, v)] + [np.concatenate([zero, e]) for e in (u, v, n)]
-
-
-def _normal_displacements(moved: np.ndarray, displacements: Sequence[np.ndarray]) -> np.ndarray:
+def _normal_displacements(moved: np.ndarray, mean_normal: np.ndarray) -> np.ndarray:
     """Return the rigid displacements (6, freedom) that move the surface along its normals, each independent of others.
 
     moved   (vertex, 6): motions of vertices along their normals for unit displacements. Two displacements are independent if
             these motions are orthogonal. Each freedom is scaled so that the largest motion is 1.
+
+    They are made of displacements along and across the mean normal (3,), then of rotations about these.
     """
-    freedoms: list[np.ndarray] = []
-    for displacement in displacements:
+    u, v, _ = _directions_across(mean_normal)
+    zero, freedoms = np.zeros(3), list[np.ndarray]()
+    translations = [np.concatenate([e, zero]) for e in (mean_normal, u, v)]
+    for displacement in (*translations, *(np.concatenate([zero, e]) for e in (u, v, mean_normal))):
         direction = displacement
         for freedom in freedoms:
             distances = moved @ freedom
@@ -226,8 +213,7 @@ def _normal_displacements(moved: np.ndarray, displacements: Sequence[np.ndarray]
 
 def _directions_across(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:
     """Return two unit vectors normal to `a` (3,) and each other, with their names: axes of the part where they are parallel."""
-    smallest = int(np.abs(a).argmin())
-    largest = int(np.abs(a).argmax())
+    smallest, largest = int(np.abs(a).argmin()), int(np.abs(a).argmax())
     if abs(a[largest]) > 1 - SAME_DIRECTION:
         i, j = (k for k in range(3) if k != largest)
         u = AXES[i] - (AXES[i] @ a) * a
@@ -238,11 +224,3 @@ def _directions_across(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str
     u = u / np.linalg.norm(u)
     v = np.cross(a, u)
     return u, v, ("xyz"[smallest] if abs(a[smallest]) < SAME_DIRECTION else "u", "v")
-
-
-def _hull(points: np.ndarray) -> np.ndarray:
-    """Return the corners (corner, 2) of the convex hull of points (point, 2)."""
-    try:
-        return points[ConvexHull(points).vertices]
-    except QhullError as error:
-        raise GeometryFault("its face is so narrow that it has no area") from error

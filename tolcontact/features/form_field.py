@@ -13,8 +13,14 @@ import numpy as np
 
 from tolcontact.declaration.size import Form
 from tolcontact.errors import GeometryFault
-from tolcontact.features.associated_features import TERMS, AssociatedSurface, displacement_terms, placed_twist
-from tolcontact.features.covariances import Lengths, covariance
+from tolcontact.features.associated_features import (
+    TERMS,
+    AssociatedSurface,
+    Lengths,
+    covariance,
+    displacement_terms,
+    placed_twist,
+)
 from tolcontact.features.minimum_zone import ZoneMember
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
 from tolcontact.geometry.surface import Surface
@@ -72,7 +78,7 @@ class FormField:
     def zone(self) -> tuple[ZoneMember, ...]:
         """The members of the zone of the form, at the places."""
         members = self.associated.members(self.places)
-        return tuple(ZoneMember(indices, self.associated.rows(self.places[indices])) for indices in members)
+        return tuple((indices, self.associated.rows(self.places[indices])) for indices in members)
 
     @cached_property
     def place_heights(self) -> np.ndarray:
@@ -122,7 +128,9 @@ class FormField:
 
 def form_field(form: Form, face: Surface, associated: AssociatedSurface) -> FormField:
     """Return the form field of a face on an analytic surface, in its part's own frame."""
-    lengths = _lengths(form, face, associated)
+    extents = face_extents(associated, np.asarray(face.mesh.vertices))
+    across = extents.across / 2 / form.lobes if form.lobes else form.length or LENGTH_SHARE * extents.across
+    lengths = Lengths(across, form.length or LENGTH_SHARE * extents.along)
     places, areas = associated.places(face, lengths)
     factor, pivots, rest = _cholesky(places, form, lengths, associated)
     stations, shares = places[pivots], areas / areas.sum()
@@ -138,20 +146,9 @@ def form_field(form: Form, face: Surface, associated: AssociatedSurface) -> Form
     count = min(form.modes, int((variances > MIN_VARIANCE * variances[-1]).sum()))
     modes = directions[:, : -count - 1 : -1]  # of the functions
     modes = modes * np.sign(np.diagonal(modes[np.abs(modes).argmax(axis=0)]))
-    return FormField(
-        form=form,
-        associated=associated,
-        lengths=lengths,
-        scales=scales_within(lengths, associated, places),
-        places=places,
-        stations=stations,
-        weights=inverse @ modes,
-        removed=removed @ modes,
-        left_out=float(1 - variances[-count:].sum() / (variances.sum() + rest @ shares)),
-        spreads=None,
-        means=None,
-        scans={},
-    )
+    left_out = float(1 - variances[-count:].sum() / (variances.sum() + rest @ shares))
+    scales, weights, removed = scales_within(lengths, associated, places), inverse @ modes, removed @ modes
+    return FormField(form, associated, lengths, scales, places, stations, weights, removed, left_out, None, None, {})
 
 
 def without_displacements(
@@ -166,13 +163,6 @@ def without_displacements(
     terms = associated.is_whole * displacement_terms(associated.surface.distance(places)[1], places - centre)
     removed, *_ = np.linalg.lstsq(terms * root, functions * root, rcond=1e-10)
     return (functions - terms @ removed) * root, displaced_about_origin(removed, centre)
-
-
-def _lengths(form: Form, face: Surface, associated: AssociatedSurface) -> Lengths:
-    """Return the correlation lengths of a form: usually a third of the extents of a face."""
-    extents = face_extents(associated, np.asarray(face.mesh.vertices))
-    across = extents.across / 2 / form.lobes if form.lobes else form.length or LENGTH_SHARE * extents.across
-    return Lengths(across, form.length or LENGTH_SHARE * extents.along)
 
 
 def scales_within(lengths: Lengths, associated: AssociatedSurface, places: np.ndarray) -> Lengths:

@@ -83,10 +83,9 @@ class Freedom:
     @property
     def side_in_words(self) -> str:
         """The side on which its mean is off centre by cpk; empty if it is not."""
-        if self.tolerance is not None:
-            return side_in_words(self.tolerance.side) if self.tolerance.off_centre else ""
-        is_off = self.geometric is not None and (self.lot or self.mean != self.middle)
-        return side_in_words(self.geometric.side) if is_off and self.geometric is not None else ""
+        tolerance = self.tolerance or self.geometric
+        is_off = self.tolerance.off_centre if self.tolerance else self.lot or self.mean != self.middle
+        return side_in_words(tolerance.side) if tolerance and is_off else ""
 
     @property
     def description(self) -> str:

@@ -1,27 +1,49 @@
 """The form field of measured faces: their mean, and the principal components of their deviations from it.
 
-Heights of the points of each part over the nominal surface are fitted with functions of place (see height_regression), so that
-the field is known at any place like any other. Coefficients vary as the measured faces do. The field is compared with the
-points: a form that changes over shorter lengths than the distance of stations, or of points, is refused.
+Heights of the points of each part over the nominal surface are fitted with functions of place, so that the field is known at
+any place like any other. Coefficients vary as the measured faces do. The field is compared with the points: a form that changes
+over shorter lengths than the distance of stations, or of points, is refused.
+
+The functions are covariances with stations: smooth where points scatter, exact where they agree. The sum of squared deviations
+from the points is minimized, with a penalty for rough fields, as in kriging with a nugget. The number of stations and the
+penalty predict points that are left out best (generalized cross-validation), over several scans.
 """
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple, Self
 
 import numpy as np
 import scipy
 
 from tolcontact.declaration.size import Covariance, Form
 from tolcontact.errors import GeometryFault
-from tolcontact.features.associated_features import AssociatedSurface, displacement_terms
-from tolcontact.features.covariances import Lengths
-from tolcontact.features.form_field import FormField, associated_covariance, scales_within, without_displacements
-from tolcontact.features.height_regression import STATIONS, HeightRegression, Scan
-from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
+from tolcontact.features.associated_features import AssociatedSurface, Lengths, covariance, displacement_terms
+from tolcontact.features.form_field import (
+    FormField,
+    associated_covariance,
+    longest_extent,
+    scales_within,
+    without_displacements,
+)
+from tolcontact.features.minimum_zone import minimum_widths
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
 from tolcontact.geometry.measured_points import measured_points
 from tolcontact.geometry.spreading import spread
 from tolcontact.geometry.surface import Surface
 
+STATIONS = (160, 320, 640, 1280)
+MAX_LENGTH_FACTOR = 40.0  # times the distance of stations, beyond which their covariances are all but dependent
+ROUNDING = 1e-11  # that is added to the variance of stations, since their covariances are all but dependent
+PENALTIES = tuple(10.0 ** np.arange(-8, 2))  # of a field of variance 1, relative to a squared deviation
+MAX_VALUES = 5_000_000  # of the covariances of a scan with stations: of more points, some are taken at random
+TRIAL_SCANS = 2  # that determine the number of stations and the penalty
+MAX_STATIONS_PER_POINT = 2
+MAX_FREEDOM_SHARE = 0.98  # of the number of points: with more, points left out cannot be predicted
+MIN_POWER = 1e-300
+GAIN_SHARE = 0.002  # of the heights: more stations must predict points better than that
+SIGNIFICANT = 2.0  # standard deviations of an error: the same, where points scatter
 COVARIANCE: Covariance = "matern 5/2"  # for the heights between stations
 MIN_EXTENT_SHARE = 0.5  # of a face, in each of its principal directions
 MIN_POINTS = 24
@@ -31,40 +53,145 @@ MIN_VARIANCE = 1e-8  # of the largest: a component with less is rounding
 MAX_LOST_SHARE = 0.25  # of the form: what the field may leave out
 MAX_EXCESS = 3.0  # times the largest height at the points: what the field may reach between them
 NEIGHBOURS = 8  # of a point, whose deviations from the field are compared with its own
-SIGNIFICANT = 5.0  # standard deviations of a mean, above which deviations from the field are more than scatter
+SIGNIFICANT_FORM = 5.0  # standard deviations of a mean, above which deviations from the field are more than scatter
 STEP_SHARE = 1e-4  # of the correlation length: steps of slopes
 
 
-def measured_field(form: Form, pattern: str, face: Surface, associated: AssociatedSurface) -> FormField:
+class Scan(NamedTuple):
+    """The points of a measured face.
+
+    path     of its file
+    feet     (point, 3) [mm] on the nominal surface
+    heights  (point,) [mm] over it, without what displaces the face as a whole
+    """
+
+    path: str
+    feet: np.ndarray
+    heights: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class HeightRegression:
+    """Fields of heights by their covariances with stations.
+
+    form        whose covariance it is
+    lengths     correlation lengths, as long as the stations tell apart: nothing draws the field towards 0 between points
+    associated  what the form is measured from
+    stations    (station, 3) [mm] all over the face
+    penalty     of rough fields
+    """
+
+    form: Form
+    lengths: Lengths
+    associated: AssociatedSurface
+    stations: np.ndarray
+    penalty: float
+
+    @classmethod
+    def of(cls, form: Form, face: Surface, associated: AssociatedSurface, scans: Sequence[Scan]) -> Self:
+        """Return the regression with the fewest stations that predict points of scans as well as more of them do."""
+        scans = scans[:: -(-len(scans) // TRIAL_SCANS)]
+        trials, fewest = list[tuple[Self, float]](), min(len(scan.feet) for scan in scans)
+        extent = longest_extent(np.asarray(face.mesh.vertices))
+        for count in STATIONS:
+            if count > max(STATIONS[0], MAX_STATIONS_PER_POINT * fewest):
+                break
+            stations = associated.surface.project(spread(face.mesh, count, None))
+            length = min(extent, MAX_LENGTH_FACTOR * float(np.sqrt(face.mesh.area / count)))
+            regression = cls(form, Lengths(length, length), associated, stations, PENALTIES[0])
+            batches = _batches(regression.samples(scans))
+            errors = np.hstack([regression._errors(feet, heights) for feet, heights in batches]).mean(axis=1)
+            best = int(errors.argmin())
+            trials.append((replace(regression, penalty=PENALTIES[best]), float(np.sqrt(errors[best]))))
+            if trials[-1][1] < GAIN_SHARE:
+                break
+        least = min(error for _, error in trials)
+        points = sum(len(scan.feet) for scan in trials[-1][0].samples(scans))
+        enough = GAIN_SHARE + (1 + SIGNIFICANT / points**0.5) * least
+        return next(regression for regression, error in trials if error <= enough)
+
+    def _errors(self, feet: np.ndarray, heights: np.ndarray) -> np.ndarray:
+        """Return the mean squared errors (penalty, part) at points left out, relative to mean squared heights (point, part)."""
+        functions = self._functions(feet)
+        eigenvalues, directions = np.linalg.eigh(functions.T @ functions)
+        eigenvalues, shares2 = np.maximum(eigenvalues, 0.0), (directions.T @ (functions.T @ heights)) ** 2
+        count, power = len(feet), np.maximum((heights**2).sum(axis=0), MIN_POWER)
+        errors = np.full((len(PENALTIES), heights.shape[1]), np.inf)
+        for number, penalty in enumerate(PENALTIES):
+            freedom = float((eigenvalues / (eigenvalues + penalty)).sum())
+            left = power - ((eigenvalues + 2 * penalty) / (eigenvalues + penalty) ** 2) @ shares2
+            if freedom <= MAX_FREEDOM_SHARE * count or penalty == PENALTIES[-1]:
+                errors[number] = (count / (count - freedom)) ** 2 * np.maximum(left, 0.0) / power
+        return errors
+
+    def samples(self, scans: Sequence[Scan]) -> list[Scan]:
+        """Return as many points of scans as the regression takes, at random."""
+        rows = [np.random.default_rng(0).permutation(len(scan.feet))[: MAX_VALUES // len(self.stations)] for scan in scans]
+        return [Scan(scan.path, scan.feet[np.sort(k)], scan.heights[np.sort(k)]) for scan, k in zip(scans, rows, strict=True)]
+
+    def weights(self, scans: Sequence[Scan]) -> np.ndarray:
+        """Return the weights (station, part) [mm] of the covariances with stations in the fields of scans."""
+        solutions = []
+        for feet, heights in _batches(scans):
+            functions = self._functions(feet)
+            matrix = functions.T @ functions
+            matrix[np.diag_indices_from(matrix)] += self.penalty
+            solutions.append(scipy.linalg.solve(matrix, functions.T @ heights, assume_a="pos"))
+        return np.asarray(scipy.linalg.solve_triangular(self._factor, np.hstack(solutions), lower=True, trans=1))
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Return the covariances (point, station) of points (point, 3) with the stations."""
+        return covariance(self.form, self.lengths, self.associated.surface, points, self.stations)
+
+    def heights(self, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Return the heights (point, part) [mm] at points (point, 3) without displacements of sections or lines.
+
+        weights   (station, part)
+        """
+        return associated_covariance(self.form, self.lengths, self.associated, points, self.stations) @ weights
+
+    def _functions(self, points: np.ndarray) -> np.ndarray:
+        """Return functions (point, station) whose coefficients have the variance 1 each, at points (point, 3)."""
+        return np.asarray(scipy.linalg.solve_triangular(self._factor, self.values(points).T, lower=True).T)
+
+    @cached_property
+    def _factor(self) -> np.ndarray:
+        """The Cholesky factor of the covariance of stations."""
+        return np.linalg.cholesky(self.values(self.stations) + ROUNDING * np.eye(len(self.stations)))
+
+
+def _batches(scans: Sequence[Scan]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the feet (point, 3) and heights (point, part) of scans in turn, together of those with equal feet."""
+    batches = list[tuple[np.ndarray, list[np.ndarray]]]()
+    for scan in scans:
+        if not (batches and np.array_equal(batches[-1][0], scan.feet)):
+            batches.append((scan.feet, []))
+        batches[-1][1].append(scan.heights)
+    return [(feet, np.column_stack(heights)) for feet, heights in batches]
+
+
+def measured_field(form: Form, face: Surface, associated: AssociatedSurface) -> FormField:
     """Return the form field of faces whose points are in files, in the frame of their part. Raises GeometryFault."""
-    form = replace(form, covariance=COVARIANCE)
+    assert form.measured is not None
+    clouds, form = measured_points(form.measured), replace(form, covariance=COVARIANCE)
     everywhere = associated.surface.project(spread(face.mesh, STATIONS[0], None))
-    scans = [_scan(cloud, str(path), face, everywhere, associated) for path, cloud in measured_points(pattern).items()]
+    scans = [_scan(cloud, str(path), face, everywhere, associated) for path, cloud in clouds.items()]
     regression = HeightRegression.of(form, face, associated, scans)
     scans = regression.samples(scans)
     weights = regression.weights(scans)
     fits = [_fit(scan, of_part, regression) for scan, of_part in zip(scans, weights.T, strict=True)]
     lengths = _lengths(regression, weights)
     places, areas = associated.places(face, lengths)
-    functions = associated_covariance(form, regression.lengths, associated, places, regression.stations) @ weights
     shares = areas / areas.sum()
-    heights, removed = without_displacements(functions, associated, places, shares)
+    heights, removed = without_displacements(regression.heights(places, weights), associated, places, shares)
     mixes, size, spreads = _principal_components(heights, form.modes)
     kept, lost = mixes.shape[1] - 1, float(np.mean([loss**2 for _, loss in fits]))
+    left_out = (float((spreads[kept:] ** 2).sum()) + lost) / max(size**2 + float((spreads**2).sum()) + lost, 1e-300)
+    scales = scales_within(lengths, associated, places)
     field = FormField(
-        form=form,
-        associated=associated,
-        lengths=regression.lengths,
-        scales=scales_within(lengths, associated, places),
-        places=places,
-        stations=regression.stations,
-        weights=weights @ mixes,
-        removed=removed @ mixes,
-        left_out=(float((spreads[kept:] ** 2).sum()) + lost) / max(size**2 + float((spreads**2).sum()) + lost, 1e-300),
-        spreads=np.array([0.0, *spreads[:kept]]),
-        means=np.array([size, *[0.0] * kept]),
-        scans={},
-    )
+        form, associated, regression.lengths, scales, places, regression.stations, weights @ mixes, removed @ mixes, left_out,
+        spreads=np.array([0.0, *spreads[:kept]]), means=np.array([size, *[0.0] * kept]), scans={},
+    )  # fmt: skip
     widths = [width for width, _ in fits]
     if not associated.is_whole:  # each section or line has a zone of its own, at places
         widths = [float(width) for width in minimum_widths(field.zone, (heights / np.sqrt(shares)[:, None]).T)]
@@ -136,7 +263,7 @@ def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> tuple
     deviations = scan.heights - values
     # Equal or opposite: waves of a few points are opposite at the second neighbour or the third.
     products = deviations[:, None] * deviations[scipy.spatial.KDTree(feet).query(feet, NEIGHBOURS + 1)[1][:, 1:]]
-    shared = float((np.abs(products.mean(axis=0)) - SIGNIFICANT * products.std(axis=0) / np.sqrt(len(feet))).max())
+    shared = float((np.abs(products.mean(axis=0)) - SIGNIFICANT_FORM * products.std(axis=0) / np.sqrt(len(feet))).max())
     lost = float(np.sqrt(max(shared, 0.0)))
     height = float(np.hypot(values.std(), lost))
     if lost > MAX_LOST_SHARE * height:
@@ -153,7 +280,7 @@ def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> tuple
             "between or beside them; measure more points, also along the rim, or filter short waves out of the points"
         )
     rows = regression.associated.rows(feet)
-    return float(minimum_widths([ZoneMember(np.arange(len(feet)), rows)], values[None])[0]), lost
+    return float(minimum_widths([(np.arange(len(feet)), rows)], values[None])[0]), lost
 
 
 def _lengths(regression: HeightRegression, weights: np.ndarray) -> Lengths:
@@ -168,19 +295,13 @@ def _lengths(regression: HeightRegression, weights: np.ndarray) -> Lengths:
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     step = STEP_SHARE * min(regression.lengths)
     slopes = np.stack([
-        (_heights(regression, stations + arms, weights) - _heights(regression, stations - arms, weights)) / (2 * step)
+        (regression.heights(stations + arms, weights) - regression.heights(stations - arms, weights)) / (2 * step)
         for arms in (step * across, step * np.cross(normals, across))
     ]).reshape(2, -1)  # fmt: skip
     moments = slopes @ slopes.T / slopes.shape[1]
     steepest = np.diagonal(moments) if is_axial else np.full(2, np.linalg.eigvalsh(moments)[-1])
-    height2 = float((_heights(regression, stations, weights) ** 2).mean())
+    height2 = float((regression.heights(stations, weights) ** 2).mean())
     return Lengths(*(
         min(length, float(np.sqrt(height2 / slope2))) if slope2 > 0 else length
         for length, slope2 in zip(regression.lengths, steepest, strict=True)
     ))  # fmt: skip
-
-
-def _heights(regression: HeightRegression, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return the heights (point, part) [mm] of fields of weights (station, part) at points (point, 3)."""
-    form, lengths, associated = regression.form, regression.lengths, regression.associated
-    return associated_covariance(form, lengths, associated, points, regression.stations) @ weights

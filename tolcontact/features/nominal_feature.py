@@ -8,15 +8,7 @@ import numpy as np
 from tolcontact.declaration import Feature
 from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import placed_twist
-from tolcontact.features.feature_geometry import (
-    AxisFeature,
-    ConeFeature,
-    FeatureGeometry,
-    FeatureOfSize,
-    GeneralFeature,
-    SlabFeature,
-    target_point,
-)
+from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature
 from tolcontact.features.form_field import FormField
 from tolcontact.geometry.faces import FaceArea
 from tolcontact.geometry.surface import Surface
@@ -84,27 +76,10 @@ class Expansion:
     columns: np.ndarray
     coefficients: np.ndarray
 
-    def of_face(
-        self, name: str, deviation: FaceDeviation | None, geometry: FeatureGeometry, placement: Placement
+    def added_to(
+        self, deviation: FaceDeviation | None, name: str, position: np.ndarray, placement: Placement, height: float = 0.0
     ) -> FaceDeviation:
-        """Return the deviation of a face that expands, in addition to the `deviation` of its feature.
-
-        A plane, cylinder, cone or sphere keeps its kind: it moves, and grows in height if it has a radius. Its rim follows its
-        centre alone. Raises GeometryFault for a general surface.
-        """
-        if isinstance(geometry, GeneralFeature):
-            raise GeometryFault(f"it is {geometry.in_words}, whose expansion is not known; choose planes and round faces")
-        fixed_point = geometry.apex if isinstance(geometry, ConeFeature) else geometry.centre
-        height = geometry.growth(0, (True,))[1] * geometry.size if isinstance(geometry, FeatureOfSize) else 0.0
-        return self._added(name, deviation, fixed_point, height, placement)
-
-    def of_point(self, name: str, deviation: FaceDeviation | None, position: np.ndarray, placement: Placement) -> FaceDeviation:
-        """Return the deviation of a point (3,) [mm] of the part that expands, in addition to the `deviation` of its feature."""
-        return self._added(name, deviation, position, 0.0, placement)
-
-    def _added(
-        self, name: str, deviation: FaceDeviation | None, position: np.ndarray, height: float, placement: Placement
-    ) -> FaceDeviation:
+        """Return a deviation with this expansion of a point (3,) [mm] of the part, and of a height [mm]."""
         R, t = placement
         if deviation is None:
             deviation = FaceDeviation(name, np.zeros(0, dtype=int), R @ position + t, np.zeros((6, 0)), np.zeros(0))
@@ -154,10 +129,7 @@ class NominalFeature:
         """Return the datum as its gauge element has it, with a number of columns."""
         if self.mobility is None:
             return self
-        coordinates = np.zeros((len(self.coordinates), columns))
-        for part in (self.coordinates, self.mobility):
-            coordinates[:, : part.shape[1]] += part
-        return replace(self, coordinates=coordinates)
+        return replace(self, coordinates=padded(self.coordinates, columns) + padded(self.mobility, columns))
 
     def face_with(self, position: np.ndarray) -> int | None:
         """Return the index of the face that a point (3,) [mm] is on; None, for the centre, if it is on none.
@@ -179,8 +151,8 @@ class NominalFeature:
     def has_moving_face(self, position: np.ndarray, normal: np.ndarray) -> bool:
         """Return whether a face that deviates lies at a point (3,) [mm], with this outward `normal` (3,)."""
         for surface, moves in zip(self.surfaces, moving_faces(self.feature), strict=True):
-            place, normals, is_over = surface.project(position[None])
-            is_on_face = is_over[0] and np.linalg.norm(place[0] - position) <= ON_FACE * surface.mesh.scale
+            (place,), normals, is_over = surface.project(position[None])
+            is_on_face = is_over[0] and np.linalg.norm(place - position) <= ON_FACE * surface.mesh.scale
             if moves and is_on_face and normals[0] @ normal > ALONG_NORMAL:
                 return True
         return False
@@ -208,7 +180,9 @@ class NominalFeature:
         deviation = self.deviation(index, (np.eye(3), np.zeros(3)))
         coordinates = np.zeros((1, self.coordinates.shape[1]))
         coordinates[:, deviation.columns] = deviation.outward(position[None], normal[None])
-        return replace(self, geometry=target_point(position, normal), coordinates=coordinates, form=None, form_columns=range(0))
+        row = np.concatenate([normal, np.zeros(3)])[None]
+        geometry = FeatureGeometry(position, ("height",), row.T, row, (position[None], normal[None, None]))
+        return replace(self, geometry=geometry, coordinates=coordinates, form=None, form_columns=range(0))
 
     def deviation(self, index: int | None, placement: Placement) -> FaceDeviation:
         """Return how a face deviates in a part at `placement`; with `index` None the centre, which no size moves."""
@@ -217,13 +191,18 @@ class NominalFeature:
         if size_column is not None and index is not None and isinstance(geometry, FeatureOfSize):
             motion, height[size_column] = geometry.growth(index, moving_faces(self.feature))
             twist[:3, size_column] += motion
-        columns, form = np.flatnonzero(twist.any(axis=0) | (height != 0)), self.form if index is not None else None
-        modes = np.arange(len(columns), len(columns) + (len(self.form_columns) if form else 0))
-        columns = np.concatenate([columns, np.array(self.form_columns if form else (), dtype=int)])
-        R, t = placement
-        turned = placed_twist(twist[:, columns], R)
-        placed = None if form is None else form.placed(R, t)
-        return FaceDeviation(self.label, columns, R @ geometry.centre + t, turned, height[columns], placed, modes)
+        displacing, (R, t) = np.flatnonzero(twist.any(axis=0) | (height != 0)), placement
+        form = self.form if index is not None else None
+        columns = np.array([*displacing, *(self.form_columns if form else ())], dtype=int)
+        return FaceDeviation(
+            name=self.label,
+            columns=columns,
+            centre=R @ geometry.centre + t,
+            twist=placed_twist(twist[:, columns], R),
+            height=height[columns],
+            form=form and form.placed(R, t),
+            modes=np.arange(len(displacing), len(columns)),
+        )
 
 
 def moving_faces(feature: Feature) -> Sequence[bool]:
@@ -231,3 +210,8 @@ def moving_faces(feature: Feature) -> Sequence[bool]:
     if feature.size is None or feature.size.moves == "both":
         return [True] * len(feature.faces)
     return [feature.size.moves == "first", feature.size.moves == "second"]
+
+
+def padded(coordinates: np.ndarray, columns: int) -> np.ndarray:
+    """Return coordinates (coordinate, column) with zeros for the columns after theirs."""
+    return np.pad(coordinates, ((0, 0), (0, columns - coordinates.shape[1])))

@@ -1,24 +1,23 @@
 """The features of a model with numbers: their freedoms, made once, and how faces deviate with everything that varies."""
 
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from itertools import compress
 from typing import Any
 
 import numpy as np
 
 from tolcontact.declaration import DatumTargets, Face, Feature, GeometricTolerance, Part, Pattern, Point, Variable
 from tolcontact.errors import GeometryFault
-from tolcontact.features.datum_frames import DatumShift, Declared, datum_frame, padded
-from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
+from tolcontact.features.datum_frames import Datums, DatumShift, Declared, datum_frame
+from tolcontact.features.feature_geometry import ConeFeature, FeatureGeometry, FeatureOfSize, GeneralFeature
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
-from tolcontact.features.nominal_feature import Expansion, FaceDeviation, NominalFeature, Placement, moving_faces
-from tolcontact.features.nominal_pattern import MIXED, RELATIVE, NominalPattern, unlike_members
+from tolcontact.features.nominal_feature import Expansion, FaceDeviation, NominalFeature, Placement, moving_faces, padded
+from tolcontact.features.nominal_pattern import MIXED, RELATIVE, NominalPattern, mobile, tolerance_layers, unlike_members
 from tolcontact.features.tolerance_kinds import form_field_of, form_tolerance
-from tolcontact.features.tolerance_layers import mobile, tolerance_layers
-from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
+from tolcontact.geometry.faces import Meshes, face_area, patch
 from tolcontact.geometry.tolerances import SAME_SIZE
 
 MIN_SHARE = 1e-6  # of a face's area: a smaller common part of two faces does not count
@@ -42,15 +41,6 @@ class Features:
     _targets: dict[tuple[int, str], tuple[NominalFeature, ...]] = field(default_factory=dict)
     _used_faces: dict[tuple[Any, ...], FaceDeviation] = field(default_factory=dict)
 
-    @cached_property
-    def _coefficients(self) -> dict[str, list[tuple[int, float]]]:
-        """The numbers of the causes that expand each part, by its name, with their coefficients."""
-        coefficients = defaultdict[str, list[tuple[int, float]]](list)
-        for number, cause in enumerate(self.causes):
-            for part, coefficient in cause.expands.items():
-                coefficients[part].append((number, coefficient))
-        return dict(coefficients)
-
     @property
     def faces(self) -> tuple[FaceDeviation, ...]:
         """The faces of features, and of parts that expand, that belong to pairs and locators."""
@@ -60,6 +50,10 @@ class Features:
     def freedoms(self) -> tuple[Freedom, ...]:
         return tuple(freedom for pattern in self.patterns for freedom in pattern.freedoms)
 
+    @property
+    def _next_column(self) -> int:
+        return self.first_column + len(self.freedoms)
+
     def copy(self) -> "Features":
         """Return a copy, so that further features do not change these."""
         copies = {name: getattr(self, name).copy() for name in ("patterns", "features", "_gauges", "_targets")}
@@ -67,36 +61,37 @@ class Features:
 
     def add(self, declared: Declared, part: int, meshes: Meshes) -> None:
         """Add a feature, a pattern or datum targets, whose datums and features have been added before. Raises GeometryFault."""
+        if not isinstance(declared, Feature):
+            noun, made_of = ("member", declared.borrowed) if isinstance(declared, Pattern) else ("feature", declared.features)
+            if lost := [feature.name for feature in made_of if feature not in self.features]:
+                raise GeometryFault(f'its {noun} "{lost[0]}" could not be made; mend that feature first')
         if isinstance(declared, DatumTargets):
-            self._add_targets(declared, part)
+            self._targets[part, declared.letter] = tuple(
+                self.features[point.on].target(np.array(point.position)) for point in declared.points if point.on is not None
+            )
             return
-        new = [member for member in declared.members if member not in self.features]
-        if isinstance(declared, Pattern) and (lost := [member.name for member in declared.borrowed if member in new]):
-            raise GeometryFault(f'its member "{lost[0]}" could not be made; mend that feature first')
         recognized = dict[Feature, NominalFeature]()
-        for member in new:
-            recognized[member] = self._recognized(member, part, meshes, recognized.values())
-        pattern = NominalPattern(
-            declared, tuple(recognized.get(member) or self.features[member] for member in declared.members)
-        )
+        for member in declared.members:
+            if member not in self.features:
+                recognized[member] = self._recognized(member, part, meshes, recognized.values())
+        pattern = NominalPattern(declared, tuple((recognized.get(m) or self.features[m]) for m in declared.members))
         if declared.tolerances and (fault := unlike_members(pattern.geometries)):
             raise GeometryFault(fault)
         systems = [self._system(declared, tolerance, part) for tolerance in declared.geometric]
         # The order of the freedoms is the order of their columns: displacements, datum shifts, sizes, modes of forms.
-        start = self.first_column + len(self.freedoms)
+        start = self._next_column
         pattern = replace(pattern, layers=tolerance_layers(pattern, systems, start))
-        freedoms = list(_displacements(pattern))
+        freedoms = _displacements(pattern)
         shifts, coordinates = _follow_datums(pattern, start, freedoms)
         if declared.size is not None:
-            for member in new:
-                _check_size(member, recognized[member].geometry)
-                recognized[member] = replace(recognized[member], size_column=start + len(freedoms))
-                freedoms.append(Freedom(f"{recognized[member].label}.size", FEATURE, declared.size.tolerance))
+            for member, nominal in recognized.items():
+                _check_size(member, nominal.geometry)
+                recognized[member] = replace(nominal, size_column=start + len(freedoms))
+                freedoms.append(Freedom(f"{nominal.label}.size", FEATURE, declared.size.tolerance))
         form = None
         for member, nominal in recognized.items():
-            form = form_tolerance(declared, nominal.geometry)
-            shape = None if form is None else form_field_of(form, nominal.geometry, nominal.surfaces[0])
-            if shape is not None:
+            if form := form_tolerance(declared, nominal.geometry):
+                shape = form_field_of(form, nominal.geometry, nominal.surfaces[0])
                 first = start + len(freedoms)
                 recognized[member] = replace(nominal, form=shape, form_columns=range(first, first + shape.modes))
                 labels = [f"{nominal.label}.form {k:02d}" for k in range(1, shape.modes + 1)]
@@ -108,12 +103,12 @@ class Features:
         members = tuple(self.features[member] for member in declared.members)
         self.patterns.append(replace(pattern, members=members, freedoms=tuple(freedoms), shifts=tuple(shifts), form=form))
 
-    def _system(self, declared: Feature | Pattern, tolerance: GeometricTolerance, part: int) -> list[list[NominalFeature]]:
+    def _system(self, declared: Feature | Pattern, tolerance: GeometricTolerance, part: int) -> list[Datums]:
         """Return the datums of a tolerance, compartment by compartment; those with play as their gauge elements have them.
 
         Raises GeometryFault for a datum that could not be made.
         """
-        known, system = self.datums(part), list[list[NominalFeature]]()
+        known, system = self.datums(part), list[Datums]()
         for letters, modifier in zip(tolerance.system, tolerance.modifiers, strict=True):
             if absent := [letter for letter in letters if letter not in known]:
                 raise GeometryFault(
@@ -128,35 +123,22 @@ class Features:
         return system
 
     def _at_gauge(
-        self,
-        declared: Feature | Pattern,
-        tolerance: GeometricTolerance,
-        datum: NominalPattern,
-        before: Sequence[Sequence[NominalFeature]],
+        self, declared: Feature | Pattern, tolerance: GeometricTolerance, datum: NominalPattern, before: Sequence[Datums]
     ) -> NominalFeature:
         """Return a datum as its gauge element has it, which other tolerances share in a simultaneous requirement.
 
         before   the datums before it in the system of the tolerance
         """
-        is_shared = tolerance.simultaneous
-        is_shared = declared.part.standard == "ASME" if is_shared is None else is_shared
+        is_shared = declared.part.standard == "ASME" if tolerance.simultaneous is None else tolerance.simultaneous
         owner = (datum.declared if is_shared else declared).label
         label = f"{owner}.mobility of datum {datum.declared.datum} of {tolerance.datums.replace(' ', '')}"
         if label not in self._gauges:
-            start, k = self.first_column + len(self.freedoms), len(before)
+            start, k = self._next_column, len(before)
             frame = datum_frame(before, datum.centre, datum.reach, start, tolerance.orientation_only[:k])
             gauge = mobile(datum, frame.free, tolerance.modifiers[k], start, label)
             self.patterns += [gauge] if gauge.freedoms else []
             self._gauges[label] = gauge.members[0]
         return self._gauges[label]
-
-    def _add_targets(self, targets: DatumTargets, part: int) -> None:
-        """Add a datum whose features have been added before. Raises GeometryFault for a target that is not on its feature."""
-        if lost := [feature.name for feature in targets.features if feature not in self.features]:
-            raise GeometryFault(f'its feature "{lost[0]}" could not be made; mend that feature first')
-        self._targets[part, targets.letter] = tuple(
-            self.features[point.on].target(np.array(point.position)) for point in targets.points if point.on is not None
-        )
 
     def datums(self, part: int) -> dict[str | None, tuple[NominalFeature, ...]]:
         """Return the datums of a part that have been added, by letters: several features or targets for a common datum."""
@@ -172,34 +154,47 @@ class Features:
         surfaces = tuple(patch(face, meshes) for face in feature.faces)
         areas = tuple(face_area(face, meshes) for face in feature.faces)
         for earlier in (*self.features.values(), *members):
-            if earlier.feature.part is feature.part:
-                _check_disjoint(feature, areas, earlier, meshes)
+            if earlier.feature.part is feature.part and any(
+                face.share(earlier_face, meshes[feature.part]) > MIN_SHARE
+                for face in compress(areas, moving_faces(feature))
+                for earlier_face in compress(earlier.areas, moving_faces(earlier.feature))
+            ):
+                raise GeometryFault(
+                    f'it shares a face with feature "{earlier.feature.name}", so that would deviate twice; give all '
+                    "tolerances of a face to one feature"
+                )
         geometry = feature_geometry(surfaces)
         return NominalFeature(feature, part, geometry, surfaces, areas, np.zeros((len(geometry.names), 0)))
 
     def expansion(self, part: Part) -> Expansion | None:
         """Return the expansion of a part by temperatures, once all features have been added; None if none expands it."""
-        causes = self._coefficients.get(part.name)
-        if causes is None:
+        coefficients = {k: cause.expands[part.name] for k, cause in enumerate(self.causes) if part.name in cause.expands}
+        if not coefficients:
             return None
-        numbers, coefficients = zip(*causes, strict=True)
-        return Expansion(self.first_column + len(self.freedoms) + np.array(numbers), np.array(coefficients, dtype=float))
+        return Expansion(self._next_column + np.array([*coefficients]), np.array([*coefficients.values()], dtype=float))
 
     def deviation(self, face: Face, meshes: Meshes, placement: Placement) -> FaceDeviation | None:
-        """Return how a face deviates with its feature, and expands with its part; None for neither. Raises GeometryFault."""
-        deviation, expansion, key = (
-            self.face_at(face, meshes, placement),
-            self.expansion(face.part),
-            (face.part, *face.selections),
-        )
+        """Return how a face deviates with its feature, and expands with its part; None for neither. Raises GeometryFault.
+
+        A plane, cylinder, cone or sphere that expands keeps its kind: it moves, and grows in height if it has a radius. Its rim
+        follows its centre alone.
+        """
+        deviation, expansion = self.face_at(face, meshes, placement), self.expansion(face.part)
         if expansion is None:
             return deviation
+        key = (face.part, *face.selections)
         if key not in self._used_faces:
             try:
                 geometry = feature_geometry([patch(face, meshes)])
-                self._used_faces[key] = expansion.of_face(str(face), deviation, geometry, placement)
+                if isinstance(geometry, GeneralFeature):
+                    raise GeometryFault(
+                        f"it is {geometry.in_words}, whose expansion is not known; choose planes and round faces"
+                    )
             except GeometryFault as fault:
                 raise GeometryFault(f'face {face} of part "{face.part.name}", which expands: {fault}') from fault
+            fixed_point = geometry.apex if isinstance(geometry, ConeFeature) else geometry.centre
+            height = geometry.growth(0, (True,))[1] * geometry.size if isinstance(geometry, FeatureOfSize) else 0.0
+            self._used_faces[key] = expansion.added_to(deviation, str(face), fixed_point, placement, height)
         return self._used_faces[key]
 
     def position(self, point: Point) -> np.ndarray:
@@ -215,7 +210,7 @@ class Features:
             feature = self.features[point.on]
             number = None if point.position is None else feature.face_with(np.array(point.position))
             deviation = feature.deviation(number, placement)
-        return expansion.of_point(str(point), deviation, self.position(point), placement) if expansion else deviation
+        return expansion.added_to(deviation, str(point), self.position(point), placement) if expansion else deviation
 
     def at_point(
         self, deviation: FaceDeviation | None, part: Part, point: np.ndarray, placement: Placement
@@ -228,7 +223,7 @@ class Features:
         if key not in self._used_faces:
             position = (point - t) @ R
             name = "{} ({:g}, {:g}, {:g})".format(part.name, *position)
-            self._used_faces[key] = expansion.of_point(name, deviation, position, placement)
+            self._used_faces[key] = expansion.added_to(deviation, name, position, placement)
         return self._used_faces[key]
 
     def face_at(self, face: Face, meshes: Meshes, placement: Placement) -> FaceDeviation | None:
@@ -285,17 +280,18 @@ class Features:
         return self._used_faces[key]
 
 
-def _displacements(pattern: NominalPattern) -> Iterator[Freedom]:
-    """Yield the freedoms of the directions that layers add, named after the feature or pattern that they move."""
-    counts, declared = Counter[str](), pattern.declared
+def _displacements(pattern: NominalPattern) -> list[Freedom]:
+    """Return the freedoms of the directions that layers add, named after the feature or pattern that they move."""
+    counts, freedoms = Counter[str](), list[Freedom]()
     for layer in pattern.layers:
         for direction in layer.added.T:
             member = pattern.owner(direction)
-            owner = declared if member is None else declared.members[member]
+            owner = pattern.declared if member is None else pattern.members[member]
             label = f"{owner.label}.{pattern.freedom_name(direction)}"
             counts[label] += 1
             label = f"{label} {counts[label]}" if label.endswith((MIXED, RELATIVE)) else label
-            yield Freedom(label, FEATURE, geometric=layer.tolerance)
+            freedoms.append(Freedom(label, FEATURE, geometric=layer.tolerance))
+    return freedoms
 
 
 def _follow_datums(pattern: NominalPattern, start: int, freedoms: list[Freedom]) -> tuple[list[DatumShift], np.ndarray]:
@@ -316,17 +312,6 @@ def _follow_datums(pattern: NominalPattern, start: int, freedoms: list[Freedom])
         coordinates[:, layer.columns] = layer.added
         coordinates[:, places] += effect @ layer.frame.motion[:, kept]
     return shifts, coordinates
-
-
-def _check_disjoint(feature: Feature, areas: Sequence[FaceArea], earlier: NominalFeature, meshes: Meshes) -> None:
-    """Raise GeometryFault if a face that deviates with a feature also deviates with an earlier feature of its part."""
-    for face, moves in zip(areas, moving_faces(feature), strict=True):
-        for earlier_face, earlier_moves in zip(earlier.areas, moving_faces(earlier.feature), strict=True):
-            if moves and earlier_moves and face.share(earlier_face, meshes[feature.part]) > MIN_SHARE:
-                raise GeometryFault(
-                    f'it shares a face with feature "{earlier.feature.name}", so that would deviate twice; give all '
-                    "tolerances of a face to one feature"
-                )
 
 
 def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:

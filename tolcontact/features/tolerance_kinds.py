@@ -1,7 +1,7 @@
 """Tolerance kinds: the features that each kind of tolerance is for, its zone, and the form that it draws.
 
 A new kind is a row in `declaration/feature_tolerance.py` and a row of ZONES. A zone limits displacements of a feature; the
-datums of a tolerance leave some of these free (see tolerance_layers).
+datums of a tolerance leave some of these free (see nominal_pattern).
 
 A zone is a function of the tolerance, the feature, and the geometry of the first datum feature (None without datums). It
 returns rows (point, component, coordinate): inside the zone, no vector `rows[point] @ coordinates` exceeds half the width. It
@@ -26,7 +26,7 @@ from tolcontact.features.feature_geometry import (
     PlaneFeature,
     SlabFeature,
     SphereFeature,
-)
+)  # fmt: skip
 from tolcontact.features.feature_recognition import analytic_surface
 from tolcontact.features.form_field import FormField, form_field
 from tolcontact.features.measured_field import measured_field
@@ -38,7 +38,6 @@ Zone = Callable[[GeometricTolerance, FeatureGeometry, FeatureGeometry | None], n
 
 def surface_zone(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> np.ndarray:
     """Return the rows of a zone on both sides of the nominal surface, or around a centre: it limits location."""
-    _refuse_axis_options(tolerance)
     if tolerance.outside is not None and type(feature) is not PlaneFeature:
         raise GeometryFault(
             f"{tolerance.kind} is for planes, if it says how much of it is outside, and it is {feature.in_words}"
@@ -48,7 +47,6 @@ def surface_zone(tolerance: GeometricTolerance, feature: FeatureGeometry, primar
 
 def slope_zone(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> np.ndarray:
     """Return the rows of a zone between two planes that may lie anywhere: it limits the tilts of a plane."""
-    _refuse_axis_options(tolerance)
     assert isinstance(feature, PlaneFeature)
     return feature.slopes
 
@@ -78,20 +76,11 @@ def direction_zone(tolerance: GeometricTolerance, feature: FeatureGeometry, prim
 
 def form_zone(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> np.ndarray:
     """Return no rows: a zone that may lie anywhere and has the nominal shape limits form, and no displacement."""
-    _refuse_axis_options(tolerance)
     return np.zeros((0, 1, len(feature.names)))
 
 
-def _refuse_axis_options(tolerance: GeometricTolerance) -> None:
-    if tolerance.zone or tolerance.along is not None or tolerance.projected is not None:
-        raise GeometryFault(f"{tolerance.kind}: zone, along and projected are for axes; leave them out")
-
-
 def _across(tolerance: GeometricTolerance, feature: AxisFeature) -> np.ndarray | None:
-    """Return the components (2,) of the direction across a flat zone in the two directions across the axis.
-
-    A round zone has none.
-    """
+    """Return the components (2,) of the direction across a flat zone in the two directions across the axis; else None."""
     if tolerance.zone != "flat" or tolerance.across is None:
         return None
     components = feature.twists[:3, :2].T @ np.array(tolerance.across)
@@ -159,7 +148,12 @@ def zone_rows(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: 
         raise GeometryFault(f"{tolerance.kind} is for {kinds}, and it is {feature.in_words}{advice}")
     if tolerance.tangent and type(feature) is not PlaneFeature:
         raise GeometryFault(f"{tolerance.kind}: tangent is for planes, and it is {feature.in_words}; leave it out")
-    return zones[type(feature)](tolerance, feature, primary)
+    zone = zones[type(feature)]
+    if zone in (surface_zone, slope_zone, form_zone) and (
+        tolerance.zone or tolerance.along is not None or tolerance.projected is not None
+    ):
+        raise GeometryFault(f"{tolerance.kind}: zone, along and projected are for axes; leave them out")
+    return zone(tolerance, feature, primary)
 
 
 def includes_form(tolerance: GeometricTolerance, feature: FeatureGeometry) -> bool:
@@ -194,8 +188,8 @@ def form_tolerance(toleranced: Toleranced, feature: FeatureGeometry) -> Geometri
         and (tolerance.is_form or (tolerance.limits_form_alone and not toleranced.combines(tolerance)))
     ]  # fmt: skip
     for tolerance in tolerances:
-        if tolerance.per is not None or type(feature) not in FORMS[tolerance.of]:
-            unit = " per unit" if tolerance.per is not None else ""
+        unit = "" if tolerance.per is None else " per unit"
+        if unit or type(feature) not in FORMS[tolerance.of]:
             raise GeometryFault(
                 f"the form of {tolerance.kind}{unit} of {feature.in_words} cannot be drawn; give the {tolerance.kind} "
                 "form=None, and the feature keeps its shape"
@@ -207,12 +201,9 @@ def form_tolerance(toleranced: Toleranced, feature: FeatureGeometry) -> Geometri
     return min(tolerances, key=lambda tolerance: tolerance.width, default=None)
 
 
-def form_field_of(tolerance: GeometricTolerance, feature: FeatureGeometry, face: Surface) -> FormField | None:
-    """Return the form field of a face by a tolerance; None for a tolerance without form. Raises GeometryFault."""
-    surface = analytic_surface(face)
-    if tolerance.form is None or surface is None:
-        return None
+def form_field_of(tolerance: GeometricTolerance, feature: FeatureGeometry, face: Surface) -> FormField:
+    """Return the form field of a face by the tolerance that draws its form (see form_tolerance). Raises GeometryFault."""
+    form, surface = tolerance.form, analytic_surface(face)
+    assert form is not None and surface is not None
     associated = FORMS[tolerance.of][type(feature)].of(surface, face)
-    if tolerance.form.measured is not None:
-        return measured_field(tolerance.form, tolerance.form.measured, face, associated)
-    return form_field(tolerance.form, face, associated)
+    return form_field(form, face, associated) if form.measured is None else measured_field(form, face, associated)

@@ -3,10 +3,9 @@
 .. include:: ../guide/pmi.md
 """
 
-from tolcontact.pmi.annotations import Datum, DatumReference, DatumTarget, Dimension, Pmi, Tolerance
+from tolcontact.pmi.annotations import OF_DATUMS, OF_TOLERANCES, Datum, DatumReference, DatumTarget, Dimension, Pmi, Tolerance
 from tolcontact.pmi.claims import DeclaredAnnotation
 from tolcontact.pmi.declared import DeclaredPmi, features_from_pmi
-from tolcontact.pmi.modifiers import OF_DATUMS, OF_TOLERANCES
 from tolcontact.pmi.reading import read_pmi
 
 __all__ = [

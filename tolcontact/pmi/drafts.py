@@ -21,15 +21,13 @@ from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.nominal_pattern import unlike_members
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.files import Shape
-from tolcontact.pmi import declarable
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
-from tolcontact.pmi.claims import Claim, Place, TolerancedSurfaces, claims_of
-from tolcontact.pmi.declarable import Undeclared
+from tolcontact.pmi.claims import Claim, Place, TolerancedSurfaces, Undeclared, claims_of, declared_size, declared_tolerance
 
 Statement = tuple[Claim, Control]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Draft:
     """A feature, a pattern of several members or targets of a datum, and the tolerances that it may state, with their claims.
 
@@ -53,14 +51,33 @@ class Draft:
         """The letter of the datum that it is."""
         return self.datum.annotation.letter if self.datum and isinstance(self.datum.annotation, Datum) else None
 
+    def add(self, claim: Claim) -> None:
+        """Add what a claim states of a feature. Raises Undeclared."""
+        (geometry,) = self.geometries
+        match claim.annotation:
+            case Datum() if len(claim.places) > 1 or claim.targets:
+                pass
+            case Datum() if self.letter is not None:
+                raise Undeclared(f"its surface is datum {self.letter} already")
+            case Datum():
+                self.datum = claim
+            case Dimension() as dimension:
+                if not isinstance(geometry, FeatureOfSize):
+                    kind = self.name.partition(" ")[0]
+                    raise Undeclared(
+                        f"sizes of features are those of cylinders, spheres and two opposed planes, and it is a {kind}"
+                    )
+                self.stated += ((claim, declared_size(dimension, geometry.size, is_inner=geometry.is_inner)),)
+            case tolerance:
+                self.stated += ((claim, declared_tolerance(tolerance, is_axis=isinstance(geometry, AxisFeature))),)
+
 
 def declare_features(part: Part, pmi: Pmi, read: Shape, line: str = "") -> tuple[tuple[Declared, ...], list[Claim]]:
     """Declare the features that PMI states of a part with a shape, by a line of a script; return them and all claims."""
     surfaces = TolerancedSurfaces(read)
     claims = claims_of(pmi, surfaces)
-    meshes = {part: read}
-    drafts = _drafts(part, meshes, claims, surfaces)
-    declared = _Trial(part, meshes, line).features(drafts)
+    drafts = _drafts(part, {part: read}, claims, surfaces)
+    declared = _Trial(part, {part: read}, line).features(drafts)
     return tuple(declared[draft] for draft in drafts if draft in declared), claims
 
 
@@ -69,11 +86,15 @@ def _drafts(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: Toler
     drafts: dict[Place, Draft] = {}
     for claim in claims:
         for place in claim.places:
-            name = f"{_kind(place, surfaces)} {min(min(surface) for surface in place)}"
+            kind = "planes" if len(place) > 1 else surfaces.kind(place[0]).replace("general", "surface")
+            name = f"{kind} {min(min(surface) for surface in place)}"
             try:
                 if place not in drafts:
-                    drafts[place] = _draft(name, part, meshes, place)
-                drafts[place] = _with_claim(drafts[place], claim)
+                    faces = tuple(Face(part, (Brep(*sorted(surface)),)) for surface in place)
+                    geometry = feature_geometry([patch(face, meshes) for face in faces])
+                    slab = isinstance(geometry, SlabFeature) and ("slot" if geometry.is_inner else "tab")
+                    drafts[place] = Draft(name.replace("planes", slab) if slab else name, (faces,), (geometry,))
+                drafts[place].add(claim)
             except (Undeclared, GeometryFault) as reason:
                 claim.refuse(reason, name)
     datums = [claim for claim in claims if isinstance(claim.annotation, Datum) and not claim.refusals]
@@ -84,51 +105,15 @@ def _drafts(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: Toler
             earlier = common_datums.setdefault(frozenset(claim.places), claim)
             if earlier is not claim and isinstance(earlier.annotation, Datum):
                 claim.refuse(f"its surfaces are datum {earlier.annotation.letter} already")
-    separate = [*common_datums.keys(), *(frozenset([place]) for claim in targeted for place in claim.places)]
+    separate = [*common_datums, *(frozenset([place]) for claim in targeted for place in claim.places)]
     patterns = []
     for pattern, places in list(_patterns(drafts, separate)):
-        patterns.append(replace(pattern, datum=common_datums.pop(places, None)))
+        pattern.datum = common_datums.pop(places, None)
+        patterns.append(pattern)
         for place in places:
             del drafts[place]
     datum_drafts = [_common_datum(claim, drafts) for claim in (*common_datums.values(), *targeted)]
     return [*drafts.values(), *patterns, *datum_drafts]
-
-
-def _kind(place: Place, surfaces: TolerancedSurfaces) -> str:
-    kind = "planes" if len(place) > 1 else surfaces.kind(place[0])
-    return "surface" if kind == "general" else kind
-
-
-def _draft(name: str, part: Part, meshes: Meshes, place: Place) -> Draft:
-    """Return a draft of the feature at a place. Raises GeometryFault if the place is no feature."""
-    faces = tuple(Face(part, (Brep(*sorted(surface)),)) for surface in place)
-    geometry = feature_geometry([patch(face, meshes) for face in faces])
-    if isinstance(geometry, SlabFeature):
-        name = name.replace("planes", "slot" if geometry.is_inner else "tab")
-    return Draft(name, (faces,), (geometry,))
-
-
-def _with_claim(draft: Draft, claim: Claim) -> Draft:
-    """Return a draft of a feature with what a claim states. Raises Undeclared."""
-    (geometry,) = draft.geometries
-    constituent: Control
-    match claim.annotation:
-        case Datum():
-            if len(claim.places) > 1 or claim.targets:
-                return draft
-            if draft.letter is not None:
-                raise Undeclared(f"its surface is datum {draft.letter} already")
-            return replace(draft, datum=claim)
-        case Dimension() as dimension:
-            if not isinstance(geometry, FeatureOfSize):
-                kind = draft.name.partition(" ")[0]
-                raise Undeclared(
-                    f"sizes of features are those of cylinders, spheres and two opposed planes, and it is a {kind}"
-                )
-            constituent = declarable.size(dimension, geometry.size, is_inner=geometry.is_inner)
-        case tolerance:
-            constituent = declarable.tolerance(tolerance, is_axis=isinstance(geometry, AxisFeature))
-    return replace(draft, stated=(*draft.stated, (claim, constituent)))
 
 
 def _patterns(drafts: Mapping[Place, Draft], datums: Collection[frozenset[Place]]) -> Iterator[tuple[Draft, frozenset[Place]]]:
@@ -136,10 +121,11 @@ def _patterns(drafts: Mapping[Place, Draft], datums: Collection[frozenset[Place]
 
     Members of a datum of several surfaces are one pattern, or each is a feature.
     """
-    groups: dict[tuple[int, ...], list[Place]] = defaultdict(list)
+    groups: dict[tuple[Claim, ...], list[Place]] = defaultdict(list)
     for place, draft in drafts.items():
-        if draft.datum is None and any(_keeps_together(claim) for claim, _ in draft.stated):
-            groups[tuple(id(claim) for claim, _ in draft.stated)].append(place)
+        claims = tuple(claim for claim, _ in draft.stated)
+        if draft.datum is None and any(_keeps_together(claim) for claim in claims):
+            groups[claims].append(place)
     for group in groups.values():
         places, members = frozenset(group), [drafts[place] for place in group]
         is_divided = any(places & datum and places != datum for datum in datums)
@@ -171,8 +157,7 @@ class _Trial:
 
     def __init__(self, part: Part, meshes: Meshes, line: str) -> None:
         self._part, self._meshes, self._line = part, meshes, line
-        self._numbers = Features(0)
-        self._declared: dict[Draft, Declared] = {}
+        self._numbers, self._declared = Features(0), dict[Draft, Declared]()
         for earlier in datum_order(part)[0]:
             self._numbers.add(earlier, 0, meshes)
 
@@ -181,53 +166,50 @@ class _Trial:
         needed = {member for draft in drafts for member in draft.borrowed}
         letters = {None, *self._numbers.datums(0)}
         known_letters = letters | {draft.letter for draft in drafts}
-        stated = {draft: _following(draft, draft.stated, known_letters, "is not declared") for draft in drafts}
+        for draft in drafts:
+            _keep_following(draft, known_letters, "is not declared")
         waiting = list(drafts)
         while waiting:
             ready = [
-                draft
-                for draft in waiting
-                if not any(set(constituent.letters) - letters for _, constituent in stated[draft])
+                draft for draft in waiting
+                if not any(set(control.letters) - letters for _, control in draft.stated)
                 and not any(member in waiting for member in draft.borrowed)
-            ]
+            ]  # fmt: skip
             for draft in ready:
-                declared = self._made(draft, stated[draft], is_needed=draft in needed)
+                declared = self._made(draft, is_needed=draft in needed)
                 if declared is not None:
                     self._numbers.add(declared, 0, self._meshes)
                     self._declared[draft] = declared
                     self._part.add(declared)
-            waiting = [draft for draft in waiting if draft not in ready]
             letters |= {draft.letter for draft in ready}
+            waiting = [draft for draft in waiting if draft not in ready]
             if not ready:  # a circle: its first draft with tolerances goes without those that lead into it
-                first = next(draft for draft in waiting if stated[draft])
-                stated[first] = _following(first, stated[first], letters, "refers back to it")
+                _keep_following(next(draft for draft in waiting if draft.stated), letters, "refers back to it")
         return self._declared
 
-    def _made(self, draft: Draft, stated: Sequence[Statement], *, is_needed: bool) -> Declared | None:
+    def _made(self, draft: Draft, *, is_needed: bool) -> Declared | None:
         """Return a feature with all that it can state together; None if that is nothing."""
-        tolerances: tuple[Control, ...] = ()
-        datum, name = draft.datum, draft.letter or draft.name
+        datum, letter = draft.datum, draft.letter
         absent = [member.letter or member.name for member in draft.borrowed if member not in self._declared]
         if absent and datum:
             datum.refuse(f"of its surfaces, {', '.join(dict.fromkeys(absent))} could not be declared")
             return None
-        if datum and draft.letter in self._numbers.datums(0):
-            datum.refuse(self._fault(self._feature(draft, ())) or f"the part has a datum {draft.letter} already")
+        if datum and letter in self._numbers.datums(0):
+            datum.refuse(self._fault(self._feature(draft, letter, ())) or f"the part has a datum {letter} already")
             if draft.borrowed:
                 return None
-            draft = replace(draft, datum=None)
-            datum, name = None, draft.name
-        for claim, constituent in _sizes_first(stated):
-            if any(_implies(known, constituent) for known in tolerances):
-                claim.names.append(name)
-            elif reason := self._fault(self._feature(draft, (*tolerances, constituent))):
+            datum, letter = None, None
+        name, controls = letter or draft.name, tuple[Control, ...]()
+        for claim, control in _sizes_first(draft.stated):
+            is_implied = any(_implies(earlier, control) for earlier in controls)
+            if not is_implied and (reason := self._fault(self._feature(draft, letter, (*controls, control)))):
                 claim.refuse(reason, name)
             else:
                 claim.names.append(name)
-                tolerances = (*tolerances, constituent)
-        if not (tolerances or datum or is_needed):
+                controls += () if is_implied else (control,)
+        if not (controls or datum or is_needed):
             return None
-        declared = self._feature(draft, tolerances)
+        declared = self._feature(draft, letter, controls)
         reason = self._fault(declared)
         if datum and reason:
             datum.refuse(reason)
@@ -235,17 +217,17 @@ class _Trial:
             datum.names.append(name)
         return None if reason else declared
 
-    def _feature(self, draft: Draft, tolerances: tuple[Control, ...]) -> Declared:
-        """Return what a draft declares with some tolerances."""
-        name, letter, part = draft.letter or draft.name, draft.letter, self._part
+    def _feature(self, draft: Draft, letter: str | None, controls: tuple[Control, ...]) -> Declared:
+        """Return what a draft declares as a datum with a letter, or as none, with some tolerances."""
+        name, part = letter or draft.name, self._part
         if len(draft.faces) == 1:
-            return Feature(name, part, draft.faces[0], tolerances, letter, self._line)
+            return Feature(name, part, draft.faces[0], controls, letter, self._line)
         members = [self._declared.get(member) for member in draft.borrowed]
         borrowed = tuple(member for member in members if isinstance(member, Feature))
         if draft.targets:
             points = zip(borrowed, draft.targets, strict=True) if len(borrowed) == len(draft.targets) else ()
             return DatumTargets(name, tuple(feature.point(*point) for feature, point in points), self._line)
-        return Pattern(name, part, borrowed or draft.faces, tolerances, letter, self._line)
+        return Pattern(name, part, borrowed or draft.faces, controls, letter, self._line)
 
     def _fault(self, declared: Declared) -> str:
         """Return why something cannot be added to what is declared before it; "" if it can."""
@@ -262,26 +244,23 @@ def _sizes_first(stated: Sequence[Statement]) -> list[Statement]:
     """Return statements with the sizes first, and those that narrower tolerances of the same kind imply last."""
 
     def place(statement: Statement) -> int:
-        _, constituent = statement
-        is_implied = any(_implies(known, constituent) and not _implies(constituent, known) for _, known in stated)
-        return 0 if isinstance(constituent, Size) else 2 if is_implied else 1
+        _, control = statement
+        is_implied = any(_implies(other, control) and not _implies(control, other) for _, other in stated)
+        return 0 if isinstance(control, Size) else 2 if is_implied else 1
 
     return sorted(stated, key=place)
 
 
-def _implies(known: Control, stated: Control) -> bool:
+def _implies(other: Control, stated: Control) -> bool:
     """Return whether a tolerance implies a stated one: all but the widths are equal, and it is not wider."""
-    if isinstance(known, Size) or isinstance(stated, Size):
+    if isinstance(other, Size) or isinstance(stated, Size):
         return False
-    return known.width <= stated.width and replace(stated, width=known.width) == known
+    return other.width <= stated.width and replace(stated, width=other.width) == other
 
 
-def _following(draft: Draft, stated: Sequence[Statement], letters: Set[str | None], reason: str) -> tuple[Statement, ...]:
-    """Return the statements of a draft that refer to datums with some letters only; the claims of the others are refused."""
-    following = list[Statement]()
-    for claim, tolerance in stated:
-        if missing := set(tolerance.letters) - letters:
+def _keep_following(draft: Draft, letters: Set[str | None], reason: str) -> None:
+    """Keep the statements of a draft that refer to datums with some letters only; the claims of the others are refused."""
+    for claim, control in draft.stated:
+        if missing := set(control.letters) - letters:
             claim.refuse(f"datum {min(missing)} {reason}", draft.name)
-        else:
-            following.append((claim, tolerance))
-    return tuple(following)
+    draft.stated = tuple(statement for statement in draft.stated if not set(statement[1].letters) - letters)

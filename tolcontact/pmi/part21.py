@@ -29,14 +29,9 @@ class Reference(int):
 
 
 class Word(str):
-    """A value of an enumeration, without its dots."""
+    """A value of an enumeration as a text in lower case: "free state"."""
 
     __slots__ = ()
-
-    @property
-    def text(self) -> str:
-        """The value as a text in lower case: "free state"."""
-        return self.lower().replace("_", " ")
 
 
 class Typed(NamedTuple):
@@ -71,7 +66,7 @@ class Parameters(tuple[Value, ...]):
 
     def words(self, index: int) -> list[str]:
         """Return the values of enumerations in a parameter, as texts in lower case."""
-        return [value.text for value in flat(self.value(index)) if isinstance(value, Word)]
+        return [str(value) for value in flat(self.value(index)) if isinstance(value, Word)]
 
 
 def flat(value: Value) -> Iterator[Value]:
@@ -139,6 +134,11 @@ class Records:
         instance = self.entities(number)
         return next((instance[entity] for entity in entities if instance.get(entity)), Parameters())
 
+    def each(self, *entities: str) -> Iterator[tuple[int, Parameters]]:
+        """Yield the numbers of all records of these entities, in ascending order, with their parameters."""
+        for number in self.numbers(*entities):
+            yield number, self.parameters(number, *entities)
+
     def shapes(self, *numbers: int) -> dict[int, Parameters]:
         """Return the parameters of records of shapes, by their numbers. All of the file is searched, once for each call."""
         found, wanted = dict[int, Parameters](), frozenset(numbers)
@@ -181,7 +181,7 @@ def _value(kind: str, token: bytes) -> Value:
         case "string":
             return decoded(token[1:-1].replace(b"\r", b"").replace(b"\n", b""))
         case "word":
-            return Word(token[1:-1].decode("latin-1"))
+            return Word(token[1:-1].decode("latin-1").lower().replace("_", " "))
         case "number":
             return float(token)
     return None
@@ -194,11 +194,6 @@ class Quantity(NamedTuple):
     unit: str
 
 
-def quantity(records: Records, number: int) -> Quantity | None:
-    """Return the measure that a record states; None if it states no finite length or angle."""
-    return _quantity(records, number, MAX_CONVERSIONS)
-
-
 def length(records: Records, number: int) -> float | None:
     """Return the length [mm] that a record states, or None."""
     measure = quantity(records, number)
@@ -208,11 +203,12 @@ def length(records: Records, number: int) -> float | None:
 def length_unit(records: Records, context: int) -> float | None:
     """Return the unit [mm] of lengths in the context of a representation; None if it states none."""
     assigned = records.parameters(context, "GLOBAL_UNIT_ASSIGNED_CONTEXT")
-    units = (_unit(records, number, MAX_CONVERSIONS) for number in assigned.references(0))
+    units = (_unit(records, number) for number in assigned.references(0))
     return next((unit.value for unit in units if unit is not None and unit.unit == "mm"), None)
 
 
-def _quantity(records: Records, number: int, conversions: int) -> Quantity | None:
+def quantity(records: Records, number: int, conversions: int = MAX_CONVERSIONS) -> Quantity | None:
+    """Return the measure that a record states; None if it states no finite length or angle."""
     for entity, parameters in records.entities(number).items():
         if entity.endswith(("MEASURE_WITH_UNIT", "MEASURE_REPRESENTATION_ITEM")) and parameters:
             return _measure(records, parameters, conversions)
@@ -229,11 +225,11 @@ def _measure(records: Records, parameters: Parameters, conversions: int) -> Quan
     return None
 
 
-def _unit(records: Records, number: int, conversions: int) -> Quantity | None:
+def _unit(records: Records, number: int, conversions: int = MAX_CONVERSIONS) -> Quantity | None:
     """Return a unit of length or of angle in mm or rad; None for any other, and for a circular definition."""
     instance = records.entities(number)
     if "CONVERSION_BASED_UNIT" in instance and conversions:
-        return _quantity(records, instance["CONVERSION_BASED_UNIT"].reference(1), conversions - 1)
+        return quantity(records, instance["CONVERSION_BASED_UNIT"].reference(1), conversions - 1)
     words = [word for index in range(3) for word in instance.get("SI_UNIT", Parameters()).words(index)]
     scale = next((_PREFIXES[word] for word in words if word in _PREFIXES), 1.0)
     if "metre" in words:

@@ -2,26 +2,98 @@
 
 The draw of a contributor in realization k depends on the seed, the contributor's label and k alone; of a correlated contributor
 also on the labels of the others. It does not depend on blocks, or on the order of declarations.
+
+Coefficients of correlation are of the Gaussian copula, of the deviations (Pearson), or of their ranks (Spearman). With normal
+scores z of correlation r, deviations x(z) and y(z) have the Pearson coefficient sum a_k b_k r^k for k from 1, where a_k and b_k
+are the coefficients of standardized x and y in normalized Hermite polynomials (Mehler's expansion). Ranks have the coefficient
+6 / pi asin(r / 2).
 """
 
 import copy
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy
 from scipy.special import ndtr, ndtri
 
 from tolcontact.declaration import Correlation
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.features.datum_frames import Shifts
-from tolcontact.variation.correlations import copula_matrix, in_words
-from tolcontact.variation.plans import STREAM, Numbers, Plan
+from tolcontact.features.freedoms import Freedom
+from tolcontact.variation.plans import STREAM, Numbers, planned_numbers
 from tolcontact.variation.spreads import envelopes, fill_zones
 from tolcontact.vocabulary import MONTE_CARLO
 
+MAX_SCORE, SCORES, TERMS = 8.0, 8001, 80
+MIN_EIGENVALUE = 1e-12  # of a matrix of coefficients
 MIN_UNIFORM = 1e-16  # smallest distance of a number from 0 and 1
 MAX_NAMED = 4  # contributors with means on one side
 ROUNDING = 1e-12  # of a column: independent deviations that are no larger are what sums leave over
+
+
+def hermite_coefficients(freedom: Freedom) -> np.ndarray:
+    """Return the coefficients (term,) of a freedom's standardized deviation, from the first one on; zeros if it is constant."""
+    z = np.linspace(-MAX_SCORE, MAX_SCORE, SCORES)
+    weights = np.exp(-(z**2) / 2)
+    weights /= weights.sum()
+    deviations = freedom.deviations(ndtr(z))
+    deviations = deviations - weights @ deviations
+    polynomials = [np.ones_like(z), z]
+    for k in range(1, TERMS):
+        polynomials.append((z * polynomials[k] - np.sqrt(k) * polynomials[k - 1]) / np.sqrt(k + 1))
+    spread = np.sqrt(weights @ deviations**2)
+    return np.array(polynomials[1:]) @ (weights * deviations) / spread if spread > 0 else np.zeros(TERMS)
+
+
+def pearson(copula: float, first: np.ndarray, second: np.ndarray) -> float:
+    """Return the Pearson coefficient for one of the copula, and coefficients (term,) of both deviations."""
+    return float((first * second) @ copula ** np.arange(1, TERMS + 1))
+
+
+def rank(copula: float) -> float:
+    """Return the coefficient of ranks (Spearman) for one of the copula."""
+    return float(6 / np.pi * np.arcsin(copula / 2))
+
+
+def copula_matrix(correlation: Correlation, freedoms: Sequence[Freedom], model: str) -> np.ndarray:
+    """Return the matrix of the Gaussian copula of a correlation. Raises ModelError for coefficients that cannot exist."""
+    matrix = np.array(correlation.matrix)
+    if correlation.kind == "copula":
+        return matrix
+    terms = [hermite_coefficients(freedom) for freedom in freedoms]
+    faults = list[str]()
+    for row, column in zip(*np.tril_indices(len(matrix), -1), strict=True):
+        stated, pair = matrix[row, column], (terms[row], terms[column])
+        if correlation.kind == "rank":
+            coefficient = 2 * np.sin(np.pi / 6 * stated)
+        else:
+            low, high = pearson(-1.0, *pair), pearson(1.0, *pair)
+            if not low < stated < high:
+                first, second = correlation.labels[row], correlation.labels[column]
+                faults.append(
+                    f'"{first}" and "{second}" have Pearson coefficients from {low:.3f} to {high:.3f} alone, by their '
+                    f"distributions, and not {stated:g}"
+                )
+                continue
+            coefficient = scipy.optimize.brentq(lambda r, pair=pair, stated=stated: pearson(r, *pair) - stated, -1, 1)
+        matrix[row, column] = matrix[column, row] = coefficient
+    if not faults and np.linalg.eigvalsh(matrix).min() < MIN_EIGENVALUE:
+        faults.append(f"no Gaussian copula has these {correlation.kind} coefficients together; make them smaller")
+    if faults:
+        raise ModelError(model, [f"{correlation.designation}: {fault}" for fault in faults])
+    return matrix
+
+
+def in_words(correlation: Correlation, matrix: np.ndarray, freedoms: Sequence[Freedom]) -> str:
+    """Return the coefficients of a correlation of all kinds, for the first two contributors, from the matrix of its copula."""
+    copula, terms = float(matrix[1, 0]), [hermite_coefficients(freedom) for freedom in freedoms[:2]]
+    first, second = correlation.labels[:2]
+    return (
+        f'correlation of "{first}" and "{second}": copula {copula:.3f}, Pearson {pearson(copula, *terms):.3f}, '
+        f"rank {rank(copula):.3f}"
+    )
 
 
 class Draws:
@@ -29,7 +101,6 @@ class Draws:
 
     contributors  the freedoms of the model with their spreads, in the order of the columns of deviations
     zones         that components of features fill
-    envelopes     of perfect form at maximum material, in which forms stay
     mean_widths   [mm] of the minimum zones of forms, by feature
     shifts        of datum planes, which follow from other deviations
     correlated    for each correlation its labels, and the lower factor of its matrix (Cholesky)
@@ -38,15 +109,16 @@ class Draws:
 
     def __init__(self, nominal: Nominal) -> None:
         self.contributors, self.zones, self.mean_widths = fill_zones(nominal)
-        self.envelopes = envelopes(nominal)
+        # Columns of sizes, and the columns that they scale by a factor: those of zones with a bonus, and of enveloped forms.
+        self._bonuses = [(np.unique(zone.sizes), zone.added, zone.scale) for zone in self.zones if zone.sizes is not None]
+        self._bonuses += [(np.array([one.size]), one.columns, one.scale) for one in envelopes(nominal)]
         self.shifts = [shift for pattern in nominal.patterns for shift in pattern.shifts]
         self._assembly = assembly = nominal.assembly
         self._column = {contributor.label: k for k, contributor in enumerate(self.contributors)}
-        self._plan = Plan(MONTE_CARLO, [])
+        self.plan = MONTE_CARLO
         self._scale = np.ones(len(self.contributors))
-        self._middle = np.array([
-            contributor.tolerance.shift if contributor.tolerance else contributor.middle for contributor in self.contributors
-        ])  # fmt: skip
+        freedoms = self.contributors
+        self._middle = np.array([freedom.tolerance.shift if freedom.tolerance else freedom.middle for freedom in freedoms])
         self.correlated = [
             (list(correlation.labels), np.linalg.cholesky(self._copula(correlation))) for correlation in assembly.correlations
         ]
@@ -65,30 +137,29 @@ class Draws:
 
         These are on lots, gaps and gauges of populations, on few parts, and on means by cpk.
         """
+        correlations, populations = self._assembly.correlations, self._assembly.populations
         lines = [
             in_words(correlation, self._copula(correlation), [self.contributors[self._column[k]] for k in correlation.labels])
-            for correlation in self._assembly.correlations
+            for correlation in correlations
         ]
-        lines += [population.in_words for population in self._assembly.populations]
-        sides: dict[str, list[str]] = {}
+        lines += [population.in_words for population in populations]
+        sides, few = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
         for freedom in self.contributors:
             if freedom.side_in_words:
-                sides.setdefault(freedom.side_in_words, []).append(freedom.label)
-        means = [f"{_shortened(labels)} {side.rstrip(',')}" for side, labels in sides.items()]
-        few: dict[str, list[str]] = {}
-        for freedom in (freedom for freedom in self.contributors if freedom.parts):
-            few.setdefault(f"{freedom.parts} parts", []).append(freedom.label)
-        for population, label in zip(self._assembly.populations, self.population_labels, strict=True):
-            count = f"{len(population.members)} lots" if population.lots else f"{len(population.values)} parts"
-            few.setdefault(count, []).append(label)
+                sides[freedom.side_in_words].append(freedom.label)
+            if freedom.parts:
+                few[f"{freedom.parts} parts"].append(freedom.label)
+        for population, label in zip(populations, self.population_labels, strict=True):
+            few[f"{len(population.members)} lots" if population.lots else f"{len(population.values)} parts"].append(label)
         known = [f"{_shortened(labels)} from {count}" for count, labels in few.items()]
+        means = [f"{_shortened(labels)} {side.rstrip(',')}" for side, labels in sides.items()]
         lines += [f"known from few parts, which intervals of measurements include: {'; '.join(known)}"] * bool(known)
         return lines + [f"means off centre by cpk: {'; '.join(means)}"] * bool(means)
 
     def planned(self, name: str) -> "Draws":
         """Return draws of the same contributors by a sampling plan (see plans)."""
         draws = copy.copy(self)
-        draws._plan = Plan(name, [*self._column, *self.population_labels])
+        draws.plan = name
         return draws
 
     def scaled(self, factors: np.ndarray) -> "Draws":
@@ -102,11 +173,6 @@ class Draws:
         """Labels of the columns of deviations."""
         return list(self._column)
 
-    @property
-    def plan(self) -> str:
-        """The name of the sampling plan."""
-        return self._plan.name
-
     def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
         """Return deviations (realization, contributor) of realizations `start` to `stop`, in mm or the contributor's units.
 
@@ -116,7 +182,7 @@ class Draws:
 
     def numbers(self, *, seed: int, start: int, stop: int) -> Numbers:
         """Return the numbers between 0 and 1 of realizations `start` to `stop`, by label."""
-        return self._plan.numbers(seed, start, stop)
+        return planned_numbers(self.plan, [*self._column, *self.population_labels], seed, start, stop)
 
     @property
     def varying(self) -> list[str]:
@@ -128,7 +194,11 @@ class Draws:
 
     def from_numbers(self, numbers: Numbers, count: int) -> np.ndarray:
         """Return deviations (count, contributor) for numbers between 0 and 1 of each label."""
-        deviations = self._single_draws(numbers, count)
+        deviations = np.empty((count, len(self.contributors)))
+        correlated = self._correlated_numbers(numbers)
+        for column, contributor in enumerate(self.contributors):
+            u = correlated[column] if column in correlated else numbers(contributor.label)
+            deviations[:, column] = contributor.deviations(u)
         if not (self._scale == 1.0).all():
             deviations = self._middle + self._scale * (deviations - self._middle)
         measured = zip(self._assembly.populations, self.population_labels, self.populations, strict=True)
@@ -136,7 +206,11 @@ class Draws:
             deviations[:, columns] = values[population.rows(numbers(label))]
         self._add_causes_and_bonuses(deviations)
         self.add_shifts(deviations)
-        self._check_finite(deviations)
+        for contributor, drawn in zip(self.contributors, deviations.T, strict=True):
+            if not np.isfinite(drawn).all():
+                distribution = contributor.tolerance or contributor.description
+                fault = f"its distribution, {distribution}, yields non-finite deviations"
+                raise ModelError(self._assembly.name, [f'{contributor.source} "{contributor.label}": {fault}'])
         return deviations
 
     def add_shifts(self, deviations: np.ndarray) -> None:
@@ -145,27 +219,13 @@ class Draws:
         for shift in self.shifts:
             deviations[:, shift.columns] = shift.shifts(deviations, computed)
 
-    def _single_draws(self, numbers: Numbers, count: int) -> np.ndarray:
-        """Return deviations (count, contributor) of each contributor alone, or in its correlation."""
-        deviations = np.empty((count, len(self.contributors)))
-        correlated = self._correlated_numbers(numbers)
-        for column, contributor in enumerate(self.contributors):
-            u = correlated[column] if column in correlated else numbers(contributor.label)
-            deviations[:, column] = contributor.deviations(u)
-        return deviations
-
     def _add_causes_and_bonuses(self, deviations: np.ndarray) -> None:
         """Add shared causes to sizes, scale components by the bonus of their sizes, and add shared causes to the rest."""
         measured = [column for columns, _ in self.populations for column in columns]
-        sizes = {int(size) for zone in self.zones if zone.sizes is not None for size in zone.sizes}
-        sizes |= {envelope.size for envelope in self.envelopes}
+        sizes = {int(size) for sizes, _, _ in self._bonuses for size in sizes}
         self._add_causes(deviations, lambda column: column in sizes)
-        for zone in (zone for zone in self.zones if zone.sizes is not None):
-            columns = np.setdiff1d(zone.added, measured)  # measured parts have used their bonus
-            deviations[:, columns] *= zone.scale(deviations)[:, None]
-        for envelope in self.envelopes:
-            columns = np.setdiff1d(envelope.columns, measured)
-            deviations[:, columns] *= envelope.scale(deviations)[:, None]
+        for _, columns, scale in self._bonuses:
+            deviations[:, np.setdiff1d(columns, measured)] *= scale(deviations)[:, None]  # measured parts have used their bonus
         self._add_causes(deviations, lambda column: column not in sizes)
 
     @property
@@ -182,13 +242,10 @@ class Draws:
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
         sets += [list(map(int, columns)) for columns, _ in self.populations]
         together = [[*shift.columns, *map(int, shift.sources)] for shift in self.shifts]
-        together += [sorted({*map(int, zone.sizes), *map(int, zone.added)}) for zone in self.zones if zone.sizes is not None]
-        together += [[envelope.size, *map(int, envelope.columns)] for envelope in self.envelopes]
+        together += [sorted({*map(int, sizes), *map(int, columns)}) for sizes, columns, _ in self._bonuses]
         # What follows from others by more than a sum also follows from the causes that drive them.
         followed = {column for columns in together for column in columns}
-        of_causes = [
-            [self._column[cause.name], *(self._column[label] for label in cause.drives)] for cause in self._assembly.variables
-        ]
+        of_causes = ([self._column[label] for label in (cause.name, *cause.drives)] for cause in self._assembly.variables)
         return sets + together + [columns for columns in of_causes if followed & set(columns[1:])]
 
     def without_shared_causes(self, deviations: np.ndarray) -> np.ndarray:
@@ -243,13 +300,6 @@ class Draws:
             for label, u in zip(labels, ndtr(mixed).T, strict=True):
                 uniforms[self._column[label]] = u.clip(MIN_UNIFORM, 1 - MIN_UNIFORM)
         return uniforms
-
-    def _check_finite(self, deviations: np.ndarray) -> None:
-        for contributor, column in zip(self.contributors, deviations.T, strict=True):
-            if not np.isfinite(column).all():
-                distribution = contributor.tolerance or contributor.description
-                fault = f"its distribution, {distribution}, yields non-finite deviations"
-                raise ModelError(self._assembly.name, [f'{contributor.source} "{contributor.label}": {fault}'])
 
 
 def _shortened(labels: list[str]) -> str:

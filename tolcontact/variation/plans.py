@@ -28,49 +28,42 @@ Numbers = Callable[[str], np.ndarray]  # numbers (realization,) strictly between
 def uniform(seed: int, label: str, start: int, stop: int) -> np.ndarray:
     """Return numbers strictly between 0 and 1 of a label for realizations `start` to `stop`."""
     streams = range(start // STREAM, -(-stop // STREAM))
-    integers = np.concatenate([generator(seed, label, stream).integers(0, 1 << BITS, STREAM) for stream in streams])
+    integers = np.concatenate([_generator(seed, label, stream).integers(0, 1 << BITS, STREAM) for stream in streams])
     offset = start - streams.start * STREAM
     return (integers[offset : offset + stop - start] + 0.5) * 2.0**-BITS
 
 
-def generator(seed: int, label: str, stream: int) -> np.random.Generator:
-    """Return the random generator of a seed, a label, and the number of a stream (-1 or above)."""
+def _generator(seed: int, label: str, stream: int | None = None) -> np.random.Generator:
     key = int.from_bytes(hashlib.blake2b(label.encode(), digest_size=8).digest(), "little")
-    spawn_key = (key, stream) if stream >= 0 else (key,)
+    spawn_key = (key,) if stream is None else (key, stream)
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=spawn_key)))
 
 
-class Plan:
-    """The numbers of some labels by the name of a plan. All other labels have independent numbers."""
-
-    def __init__(self, name: str, labels: Sequence[str]) -> None:
-        self.name = name
-        self._column = {label: k for k, label in enumerate(sorted(labels))}  # the order of declarations does not matter
-
-    def numbers(self, seed: int, start: int, stop: int) -> Numbers:
-        """Return the numbers of realizations `start` to `stop`."""
-        if self.name == MONTE_CARLO or not self._column:
-            return lambda label: uniform(seed, label, start, stop)
-        replicates = range(start // REPLICATE, -(-stop // REPLICATE))
-        points = np.concatenate([_POINTS[self.name](seed, replicate, len(self._column)) for replicate in replicates])
-        rows = points[start - replicates.start * REPLICATE :][: stop - start]
-        return lambda label: rows[:, self._column[label]] if label in self._column else uniform(seed, label, start, stop)
+def planned_numbers(plan: str, labels: Sequence[str], seed: int, start: int, stop: int) -> Numbers:
+    """Return the numbers of labels for realizations `start` to `stop` by the name of a plan; of others independent numbers."""
+    if plan == MONTE_CARLO or not labels:
+        return lambda label: uniform(seed, label, start, stop)
+    column = {label: k for k, label in enumerate(sorted(labels))}  # the order of declarations does not matter
+    replicates = range(start // REPLICATE, -(-stop // REPLICATE))
+    points = np.concatenate([_POINTS[plan](seed, replicate, len(column)) for replicate in replicates])
+    rows = points[start - replicates.start * REPLICATE :][: stop - start]
+    return lambda label: rows[:, column[label]] if label in column else uniform(seed, label, start, stop)
 
 
 def _latin(seed: int, replicate: int, count: int) -> np.ndarray:
-    rng = generator(seed, LATIN_HYPERCUBE, replicate)
+    rng = _generator(seed, LATIN_HYPERCUBE, replicate)
     return scipy.stats.qmc.LatinHypercube(count, rng=rng).random(REPLICATE).clip(2.0**-BITS, 1 - 2.0**-BITS)
 
 
 def _sobol(seed: int, replicate: int, count: int) -> np.ndarray:
-    shift = generator(seed, SOBOL, replicate).integers(0, 1 << BITS, count)
+    shift = _generator(seed, SOBOL, replicate).integers(0, 1 << BITS, count)
     return ((_net(seed, count) ^ shift) + 0.5) * 2.0**-BITS
 
 
 @functools.lru_cache(maxsize=8)
 def _net(seed: int, count: int) -> np.ndarray:
     """Return the points (REPLICATE, count) of a Sobol' sequence as whole numbers of BITS bits."""
-    points = scipy.stats.qmc.Sobol(count, scramble=True, bits=BITS, rng=generator(seed, SOBOL, -1)).random(REPLICATE)
+    points = scipy.stats.qmc.Sobol(count, scramble=True, bits=BITS, rng=_generator(seed, SOBOL)).random(REPLICATE)
     return (points * 2.0**BITS).astype(np.int64)
 
 

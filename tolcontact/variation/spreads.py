@@ -1,6 +1,5 @@
 """Spreads: how the freedoms of features fill the zones of their tolerances, from the innermost tolerance on."""
 
-import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,29 +11,24 @@ from scipy.sparse.csgraph import connected_components
 from tolcontact import code_cache
 from tolcontact.declaration import GeometricTolerance
 from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
+from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance import SIDES
 from tolcontact.discretization import Nominal
 from tolcontact.errors import GeometryFault, ModelError
-from tolcontact.features import FeatureOfSize, FormField, Freedom, Layer, NominalPattern, minimum_zone, zone_kernel
+from tolcontact.features import FeatureOfSize, FormField, Freedom, Layer, NominalFeature, NominalPattern, minimum_zone
 from tolcontact.features.freedoms import lot_score
-from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
+from tolcontact.features.minimum_zone import minimum_widths
 from tolcontact.features.tolerance_kinds import floats, includes_form
 from tolcontact.geometry.tolerances import MIN_PART
 from tolcontact.variation import zones
-from tolcontact.variation.zones import SHARE, FormedZone, MemberZone, chi_share, directions
+from tolcontact.variation.zones import SHARE, MemberZone, chi_share, directions
 
 DIRECTIONS = 1 << 12
 ENVELOPED, TINY = 1024, 1e-300  # realizations whose heights are computed at once; mm
+_KNOWN_WIDTHS: dict[str, np.ndarray] = {}
 FACES = 500  # that are drawn for the mean width of measured ones
 MIN_SPREAD, MAX_SPREAD = 1e-6, 1e3  # of the width
 INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
-
-
-def form_spreads(field: FormField, tolerance: GeometricTolerance) -> np.ndarray:
-    """Return the standard deviations (mode,) [mm] of the coefficients of a form: equal for all modes, or as measured."""
-    if field.spreads is not None:
-        return field.spreads
-    return np.full(field.modes, equal_form_spread(field, tolerance.width) / tolerance.cp)
 
 
 def equal_form_spread(field: FormField, width: float) -> float:
@@ -57,31 +51,22 @@ def mean_width(field: FormField, spreads: np.ndarray) -> float:
 
 
 def _widths(field: FormField) -> np.ndarray:
-    """Return the widths (direction,) of the minimum zones for unit vectors of coefficients in all directions evenly."""
-    zone = tuple((member.indices.tobytes(), member.rows.tobytes()) for member in field.zone)
-    return _unit_widths(zone, field.place_heights.T.tobytes(), field.modes)
+    """Return the widths (direction,) [mm] of the minimum zones for unit vectors of coefficients in all directions evenly.
 
-
-@functools.lru_cache(64)
-def _unit_widths(zone: tuple[tuple[bytes, bytes], ...], heights: bytes, modes: int) -> np.ndarray:
-    """Return the widths (direction,) [mm] of minimum zones of a number of modes with heights (place, mode).
-
-    The zone is given by the indices and the rows of its members: equal faces have equal widths. They are kept in the cache
-    folder of the user.
+    Equal faces have equal widths. They are kept in the cache folder of the user.
     """
-    sources = (Path(str(module.__file__)).read_bytes() for module in (minimum_zone, zone_kernel, zones))
-    places = np.frombuffer(heights).reshape(-1, modes)
-    counts = np.array([DIRECTIONS, *places.shape, len(zone)])
-    key = "widths-" + code_cache.digest(*sources, counts, *(content for member in zone for content in member), heights)
-    stored = code_cache.load(key)
-    if stored is None:
-        members = [
-            ZoneMember(indices, np.frombuffer(rows).reshape(len(indices), -1))
-            for indices, rows in ((np.frombuffer(indices, dtype=int), rows) for indices, rows in zone)
-        ]
-        stored = minimum_widths(members, directions(modes)[:DIRECTIONS] @ places.T).tobytes()
-        code_cache.store(key, stored)
-    return np.frombuffer(stored)
+    sources = (Path(str(module.__file__)).read_bytes() for module in (minimum_zone, zones))
+    heights = field.place_heights.T.copy()
+    counts = np.array([DIRECTIONS, *heights.shape, len(field.zone)])
+    key = "widths-" + code_cache.digest(*sources, counts, *(content for member in field.zone for content in member), heights)
+    if key not in _KNOWN_WIDTHS:
+        stored = code_cache.load(key)
+        if stored is None:
+            zone = [(indices, np.ascontiguousarray(rows)) for indices, rows in field.zone]
+            stored = minimum_widths(zone, directions(field.modes)[:DIRECTIONS] @ heights.T).tobytes()
+            code_cache.store(key, stored)
+        _KNOWN_WIDTHS[key] = np.frombuffer(stored)
+    return _KNOWN_WIDTHS[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,17 +134,19 @@ class Envelope:
 
 def envelopes(nominal: Nominal) -> list[Envelope]:
     """Return the envelopes of features whose form is drawn and has to stay inside."""
-    found = []
-    for pattern in (pattern for pattern in nominal.patterns if pattern.declared.is_enveloped and not pattern.is_gauge):
-        size = pattern.declared.size
-        for member in pattern.members:
-            if member.form is None or size is None or member.size_column is None:
-                continue
-            is_inner = isinstance(member.geometry, FeatureOfSize) and member.geometry.is_inner
-            limit, growth = (size.lower, 1.0) if is_inner else (size.upper, -1.0)
-            columns = np.array(member.form_columns)
-            found.append(Envelope(columns, member.form.place_heights, member.size_column, limit, growth))
-    return found
+    return [
+        Envelope(np.array(member.form_columns), member.form.place_heights, member.size_column, *_departure(member, size, "M"))
+        for pattern in nominal.patterns
+        if pattern.declared.is_enveloped and not pattern.is_gauge and (size := pattern.declared.size) is not None
+        for member in pattern.members
+        if member.form is not None and member.size_column is not None
+    ]
+
+
+def _departure(member: NominalFeature, size: Size, material: str) -> tuple[float, float]:
+    """Return the deviation [mm] of a size at a material limit, "M" or "L", and 1.0 or -1.0: how it departs from the limit."""
+    is_inner = isinstance(member.geometry, FeatureOfSize) and member.geometry.is_inner
+    return (size.lower, 1.0) if is_inner == (material == "M") else (size.upper, -1.0)
 
 
 def fill_zones(nominal: Nominal) -> tuple[list[Freedom], list[ComponentZone], dict[str, float]]:
@@ -173,11 +160,13 @@ def fill_zones(nominal: Nominal) -> tuple[list[Freedom], list[ComponentZone], di
         for member in pattern.members:
             if member.form is None or pattern.form is None:
                 continue
-            spreads = form_spreads(member.form, pattern.form)
-            means = np.zeros(len(spreads)) if member.form.means is None else member.form.means
+            form, means = member.form, np.zeros(member.form.modes) if member.form.means is None else member.form.means
+            spreads = form.spreads  # as measured, else equal for all modes
+            if spreads is None:
+                spreads = np.full(form.modes, equal_form_spread(form, pattern.form.width) / pattern.form.cp)
             for column, spread, mean in zip(member.form_columns, spreads, means, strict=True):
                 freedoms[column] = replace(freedoms[column], spread=float(spread), mean=float(mean))
-            mean_widths[member.label] = mean_width(member.form, spreads)
+            mean_widths[member.label] = mean_width(form, spreads)
             spreads_of_forms.append(spreads)
         try:
             component_zones += _fill_layers(pattern, spreads_of_forms, freedoms)
@@ -196,29 +185,32 @@ def _fill_layers(
     """
     basis, spreads, columns = np.zeros((pattern.count, 0)), np.zeros(0), np.zeros(0, dtype=int)
     for layer in pattern.layers:
-        lots = np.zeros(layer.added.shape[1])
-        inner_count, count, tolerance = len(spreads), layer.added.shape[1], layer.tolerance
+        tolerance, inner_count, count = layer.tolerance, len(spreads), layer.added.shape[1]
         if not count:
             continue
-        basis, columns = np.hstack([basis, layer.added]), np.concatenate([columns, layer.columns])
-        members = _member_zones(pattern, layer, basis, spreads_of_forms)
         if not tolerance.width and inner_count:
             raise GeometryFault(f"{tolerance.kind}: a zone of width 0 is its bonus alone; leave out the tolerances within it")
+        basis, columns = np.hstack([basis, layer.added]), np.concatenate([columns, layer.columns])
+        members = _member_zones(pattern, layer, basis, spreads_of_forms)
         width = float(tolerance.width) or 1.0  # for which spreads are computed: the bonus scales them
-        spread_rule = zones.extreme_spread if tolerance.rule == EXTREMES else zones.equal_spread
-        spread = spread_rule(members, spreads, count, width)
-        _check_inner_share(tolerance, [member.take(inner_count) for member in members], spreads, width)
-        _check_rule(pattern, tolerance)
+        spread = (zones.extreme_spread if tolerance.rule == EXTREMES else zones.equal_spread)(members, spreads, count, width)
+        _check(pattern, tolerance, zones.share_inside([member.take(inner_count) for member in members], spreads, width))
         spreads = np.concatenate([spreads, np.full(count, spread / tolerance.cp)])
-        offsets = pattern.offsets @ layer.controlled @ layer.controlled.T @ basis
-        middles = np.asarray(tolerance.uneven_shift * offsets)  # of the zone, in each component
-        means = middles[inner_count:].copy()
+        # The middle of the zone, in each component.
+        middles = np.asarray(tolerance.uneven_shift * (pattern.offsets @ layer.controlled @ layer.controlled.T @ basis))
+        means, lots = middles[inner_count:].copy(), np.zeros(count)
         for group, components in _groups(members):
             added, rows = components[components >= inner_count], [members[k].component_rows[..., components] for k in group]
             zone = ComponentZone(
                 columns[components], np.concatenate(rows), middles[components], tolerance.width, columns[added], width
             )
-            yield zone if not tolerance.material else _with_bonus(zone, pattern, members, group, tolerance.material)
+            sizes = [pattern.members[k].size_column for k in group]
+            if tolerance.material and pattern.declared.size is not None and None not in sizes:
+                # The zone grows as the sizes of its members depart from the material limit.
+                limit, growth = _departure(pattern.members[group[0]], pattern.declared.size, tolerance.material)
+                size_of_point = np.repeat(np.array(sizes, dtype=int), [len(members[k].rows) for k in group])
+                zone = replace(zone, sizes=size_of_point, limit=limit, growth=growth)
+            yield zone
             if tolerance.cpk is not None:
                 means[added[:1] - inner_count] += SIDES[tolerance.side] * (3 * spread * (1 - tolerance.cpk / tolerance.cp))
                 lots[added[:1] - inner_count] = lot_score(tolerance)
@@ -228,56 +220,13 @@ def _fill_layers(
             )
 
 
-def _member_zones(
-    pattern: NominalPattern, layer: Layer, basis: np.ndarray, spreads_of_forms: Sequence[np.ndarray]
-) -> list[MemberZone]:
-    """Return the zones of a layer for the members, as their components (coordinate, component) move what it controls."""
-    coordinates = layer.controlled @ layer.controlled.T @ basis
-    if len(pattern.members) > 1:
-        coordinates = np.where(np.abs(coordinates) < MIN_PART, 0.0, coordinates)
-    places, tolerance = pattern.slices, layer.tolerance
-    if not spreads_of_forms or not includes_form(tolerance, pattern.geometries[0]):
-        return [MemberZone(rows, coordinates[place]) for rows, place in zip(layer.rows, places, strict=True)]
-    members = list[MemberZone]()
-    for member, rows, place, spreads in zip(pattern.members, layer.rows, places, spreads_of_forms, strict=True):
-        form, geometry = member.form, member.geometry
-        assert form is not None
-        offsets = geometry.rows((form.places, form.normals[:, None]))[:, 0]
-        heights = spreads * form.place_heights.T
-        members.append(FormedZone(rows, coordinates[place], heights, offsets, floats(tolerance, geometry, rows)))
-    return members
-
-
-def _groups(members: Sequence[MemberZone]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield the indices of members that have components in common, and these components, in the order of the first members.
-
-    A group is one member if no component moves it and others.
-    """
-    if len(members) == 1:
-        moved = np.ones((1, members[0].coordinates.shape[1]), dtype=bool)
-    else:
-        moved = np.array([(member.component_rows != 0).any(axis=(0, 1)) for member in members])
-    _, labels = connected_components(moved.astype(int) @ moved.astype(int).T)
-    for label in range(labels.max() + 1):
-        group = np.flatnonzero(labels == label)
-        yield group, np.flatnonzero(moved[group].any(axis=0))
-
-
-def _with_bonus(
-    zone: ComponentZone, pattern: NominalPattern, members: Sequence[MemberZone], group: np.ndarray, material: str
-) -> ComponentZone:
-    """Return the zone of a group of members that grows as their sizes depart from the material limit, "M" or "L"."""
-    size, geometry = pattern.declared.size, pattern.geometries[group[0]]
-    columns = [pattern.members[k].size_column for k in group]
-    if size is None or None in columns:
-        return zone
-    is_inner = isinstance(geometry, FeatureOfSize) and geometry.is_inner
-    limit, growth = (size.lower, 1.0) if is_inner == (material == "M") else (size.upper, -1.0)
-    sizes = np.repeat(np.array(columns, dtype=int), [len(members[k].rows) for k in group])
-    return replace(zone, sizes=sizes, limit=limit, growth=growth)
-
-
-def _check_rule(pattern: NominalPattern, tolerance: GeometricTolerance) -> None:
+def _check(pattern: NominalPattern, tolerance: GeometricTolerance, inner_share: float) -> None:
+    """Raise GeometryFault for a rule that form excludes, and if narrower tolerances leave too many features outside."""
+    if inner_share < zones.SHARE - INNER_SHARE_TOLERANCE:
+        raise GeometryFault(
+            f"{tolerance.kind} {tolerance.width:g}: the narrower tolerances within it leave "
+            f"{100 * (1 - inner_share):.2g} % of the features outside already; make these narrower, or it wider"
+        )
     form, rule = pattern.form, tolerance.rule
     if form is not None and rule != INSIDE and includes_form(tolerance, pattern.geometries[0]):
         raise GeometryFault(
@@ -286,11 +235,34 @@ def _check_rule(pattern: NominalPattern, tolerance: GeometricTolerance) -> None:
         )
 
 
-def _check_inner_share(tolerance: GeometricTolerance, members: Sequence[MemberZone], spreads: np.ndarray, width: float) -> None:
-    """Raise GeometryFault if narrower tolerances, with spreads (component,), leave too many features outside of the zone."""
-    share = zones.share_inside(members, spreads, width)
-    if share < zones.SHARE - INNER_SHARE_TOLERANCE:
-        raise GeometryFault(
-            f"{tolerance.kind} {tolerance.width:g}: the narrower tolerances within it leave "
-            f"{100 * (1 - share):.2g} % of the features outside already; make these narrower, or it wider"
-        )
+def _member_zones(
+    pattern: NominalPattern, layer: Layer, basis: np.ndarray, spreads_of_forms: Sequence[np.ndarray]
+) -> list[MemberZone]:
+    """Return the zones of a layer for the members, as their components (coordinate, component) move what it controls."""
+    coordinates = layer.controlled @ layer.controlled.T @ basis
+    if len(pattern.members) > 1:
+        coordinates = np.where(np.abs(coordinates) < MIN_PART, 0.0, coordinates)
+    tolerance, members = layer.tolerance, list[MemberZone]()
+    has_form = bool(spreads_of_forms) and includes_form(tolerance, pattern.geometries[0])
+    for k, (member, rows, place) in enumerate(zip(pattern.members, layer.rows, pattern.slices, strict=True)):
+        zone, form, geometry = MemberZone(rows, coordinates[place]), member.form, member.geometry
+        if has_form and form is not None:
+            offsets = geometry.rows((form.places, form.normals[:, None]))[:, 0]
+            heights = spreads_of_forms[k] * form.place_heights.T
+            zone = replace(zone, heights=heights, offsets=offsets, floats=floats(tolerance, geometry, rows))
+        members.append(zone)
+    return members
+
+
+def _groups(members: Sequence[MemberZone]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the indices of members that have components in common, and these components, in the order of the first members.
+
+    A group is one member if no component moves it and others.
+    """
+    moved = np.array([(member.component_rows != 0).any(axis=(0, 1)) for member in members])
+    if len(members) == 1:
+        moved[:] = True
+    _, labels = connected_components(moved.astype(int) @ moved.astype(int).T)
+    for label in range(labels.max() + 1):
+        group = np.flatnonzero(labels == label)
+        yield group, np.flatnonzero(moved[group].any(axis=0))

@@ -32,10 +32,16 @@ class MemberZone:
 
     rows         (point, entry, coordinate)
     coordinates  (coordinate, component) for unit components
+    heights      (place, mode) [mm] of its form for coefficients of one standard deviation; None for a zone without form
+    offsets      (place, coordinate): heights of the surface for unit coordinates, of a zone with form
+    floats       whether a zone with form may lie anywhere along the normal of the surface
     """
 
     rows: np.ndarray
     coordinates: np.ndarray
+    heights: np.ndarray | None = None
+    offsets: np.ndarray | None = None
+    floats: bool = False
 
     @cached_property
     def component_rows(self) -> np.ndarray:
@@ -46,7 +52,7 @@ class MemberZone:
     def identity(self) -> bytes:
         """The bytes that determine shares, together with spreads."""
         rows = self.component_rows
-        return rows[..., (rows != 0).any(axis=(0, 1))].tobytes()
+        return rows[..., (rows != 0).any(axis=(0, 1))].tobytes() + (b"" if self.heights is None else self.heights.tobytes())
 
     def take(self, count: int) -> "MemberZone":
         """Return the same zone of the first components alone."""
@@ -54,6 +60,8 @@ class MemberZone:
 
     def share_inside(self, spreads: np.ndarray, width: float, count: int = 1 << LOG2_DIRECTIONS) -> float:
         """Return the share of members, with standard deviations (component,), inside a zone of a width."""
+        if self.heights is not None and self.offsets is not None:
+            return self._share_with_form(self.heights, self.offsets, spreads, width, min(count, FORM_DIRECTIONS))
         rows = self.component_rows
         if not rows.size:
             return 1.0
@@ -62,7 +70,9 @@ class MemberZone:
         if len(varying) > self.rows.shape[2]:
             # The member has fewer coordinates than components, and the same share with the root of their covariance.
             scaled = self.coordinates[:, varying] * varied
-            rows, varied = self.rows @ _root(scaled @ scaled.T), np.ones(self.rows.shape[2])
+            variances, axes = np.linalg.eigh(scaled @ scaled.T)
+            root = np.asarray((axes * np.sqrt(np.maximum(variances, 0.0))) @ axes.T)
+            rows, varied = self.rows @ root, np.ones(self.rows.shape[2])
         if not len(varied):
             return 1.0
         if (varied == varied[0]).all():  # the root of a spread tries many
@@ -71,30 +81,11 @@ class MemberZone:
             longest = _longest(rows, directions(len(varied))[:count] * varied)
         return float(chi_share(width / 2 / np.maximum(longest, 1e-300), len(varied)).mean())
 
-
-@dataclass(frozen=True, eq=False)
-class FormedZone(MemberZone):
-    """The zone of a surface that has form and displacements.
-
-    heights  (place, mode) [mm] of the form for coefficients of one standard deviation
-    offsets  (place, coordinate): heights of the surface for unit coordinates
-    floats   whether the zone may lie anywhere along the normal of the surface
-    """
-
-    heights: np.ndarray
-    offsets: np.ndarray
-    floats: bool
-
-    @property
-    def identity(self) -> bytes:
-        return super().identity + self.heights.tobytes()
-
-    def share_inside(self, spreads: np.ndarray, width: float, count: int = FORM_DIRECTIONS) -> float:
-        varying = np.flatnonzero((spreads > 0) & self.coordinates.any(axis=0))
-        modes = self.heights.shape[1]
-        unit = directions(modes + len(varying))[: min(count, FORM_DIRECTIONS)]
-        displacements = self.offsets @ (self.coordinates[:, varying] * spreads[varying])
-        heights = unit[:, :modes] @ self.heights.T + unit[:, modes:] @ displacements.T
+    def _share_with_form(self, form: np.ndarray, offsets: np.ndarray, spreads: np.ndarray, width: float, count: int) -> float:
+        varying, modes = np.flatnonzero((spreads > 0) & self.coordinates.any(axis=0)), form.shape[1]
+        unit = directions(modes + len(varying))[:count]
+        displacements = offsets @ (self.coordinates[:, varying] * spreads[varying])
+        heights = unit[:, :modes] @ form.T + unit[:, modes:] @ displacements.T
         needed = np.ptp(heights, axis=1) if self.floats else 2 * np.abs(heights).max(axis=1)
         return float(chi_share(width / np.maximum(needed, 1e-300), unit.shape[1]).mean())
 
@@ -116,26 +107,20 @@ def chi_share(lengths: np.ndarray, components: int) -> np.ndarray:
     return np.asarray(gammainc(components / 2, lengths**2 / 2))
 
 
-def _root(covariance: np.ndarray) -> np.ndarray:
-    """Return the symmetric root of a matrix without negative eigenvalues."""
-    variances, directions = np.linalg.eigh(covariance)
-    return np.asarray((directions * np.sqrt(np.maximum(variances, 0.0))) @ directions.T)
-
-
 def equal_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, count: int, width: float) -> float:
     """Return the standard deviation of `count` more components with which 99.73 % of the members lie inside their zones.
 
     The components of `members` are those with `inner_spreads` (component,), which are standard deviations, and then these.
     Features with the same zones, as holes of one size have, have the same spread: it is computed once.
     """
-    contents = [(type(member), [getattr(member, field.name) for field in fields(member)]) for member in members]
+    contents = [[getattr(member, field.name) for field in fields(member)] for member in members]
     return _equal_spread(pickle.dumps((contents, inner_spreads, count, width)))
 
 
 @functools.lru_cache(maxsize=256)
 def _equal_spread(zones: bytes) -> float:
     contents, inner_spreads, count, width = pickle.loads(zones)
-    members = [kind(*values) for kind, values in contents]
+    members = [MemberZone(*values) for values in contents]
 
     def excess(spread: float) -> float:
         return share_inside(members, np.concatenate([inner_spreads, np.full(count, spread)]), width) - SHARE
@@ -153,8 +138,7 @@ def extreme_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, cou
     inner_count, rows = len(inner_spreads), np.concatenate([member.component_rows for member in members])
     inner_variance = ((rows[..., :inner_count] * inner_spreads) ** 2).sum(axis=-1)
     factors = (rows[..., inner_count : inner_count + count] ** 2).sum(axis=-1)
-    variance = (width / 6) ** 2 - inner_variance
-    moved = factors > 0
+    moved, variance = factors > 0, (width / 6) ** 2 - inner_variance
     return float(np.sqrt(max((variance[moved] / factors[moved]).min(initial=np.inf), 0.0))) if moved.any() else 0.0
 
 

@@ -9,8 +9,7 @@ import tolcontact as tc
 from tests.cases.fits import shaft_in_a_bore
 from tests.helpers import compiled, nightly
 from tests.test_round_forms import form_of, radial_terms
-from tolcontact.features.associated_features import AssociatedSurface
-from tolcontact.features.covariances import Lengths
+from tolcontact.features.associated_features import AssociatedSurface, Lengths
 from tolcontact.features.minimum_zone import minimum_widths
 from tolcontact.geometry.analytic_surfaces import Sphere
 from tolcontact.geometry.surface import Surface

@@ -11,7 +11,7 @@ from tests.test_plans import LABELS, STRATIFIED
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import skewness
 from tolcontact.statistics.sample import Sample
-from tolcontact.variation.plans import Plan
+from tolcontact.variation.plans import planned_numbers
 from tolcontact.vocabulary import REPLICATE, SOBOL
 
 MEAN, SECOND = 1 / np.sqrt(2 * np.pi), 0.5
@@ -22,7 +22,7 @@ SKEW = (CAPPED[2] - 3 * CAPPED[0] * CAPPED[1] + 2 * CAPPED[0] ** 3) / (CAPPED[1]
 
 def clipped(name, seed, count):
     """max(0, sum of three), whose standard deviation is 1."""
-    numbers = Plan(name, LABELS).numbers(seed, 0, count)
+    numbers = planned_numbers(name, LABELS, seed, 0, count)
     return np.maximum(0.0, sum(ndtri(numbers(label)) for label in LABELS) / np.sqrt(3))
 
 
@@ -34,7 +34,7 @@ def test_intervals_with_an_incomplete_replicate_cover(name, rest):
     errors = {word: [] for word in truths}
     for seed in range(300):
         # Of a single contributor complete replicates tell nearly all.
-        values = np.maximum(0.0, ndtri(Plan(name, LABELS).numbers(seed, 0, 16 * REPLICATE + rest)(LABELS[0])))
+        values = np.maximum(0.0, ndtri(planned_numbers(name, LABELS, seed, 0, 16 * REPLICATE + rest)(LABELS[0])))
         x = Sample(lambda values=values: values, REPLICATE)
         share = intervals.proportion(x.map(lambda piece: piece > 1))
         for word, own in zip(truths, (intervals.mean(x), share, intervals.standard_deviation(x, times=6)), strict=True):

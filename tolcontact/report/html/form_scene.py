@@ -10,8 +10,7 @@ import xarray as xr
 from scipy.spatial import Delaunay, QhullError
 
 from tolcontact import vocabulary as terms
-from tolcontact.features.associated_features import displacement_terms
-from tolcontact.features.covariances import COVARIANCES
+from tolcontact.features.associated_features import COVARIANCES, displacement_terms
 
 MAX_GAPS = 1_000_000  # in a page: of all contact points in both states of the single realizations
 FLATNESS = 1e-6  # of the size of a face: tolerance for vertices and normals of a plane
