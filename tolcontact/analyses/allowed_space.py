@@ -12,7 +12,7 @@ import scipy
 
 from tolcontact.declaration import Tolerance
 from tolcontact.features.freedoms import TAIL, Freedom
-from tolcontact.statistics.linear_shares import joined_columns
+from tolcontact.statistics.variance_shares import joined_columns
 from tolcontact.variation.draws import Draws
 from tolcontact.variation.spreads import ComponentZone
 

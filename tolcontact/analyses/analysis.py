@@ -18,7 +18,7 @@ from tolcontact.method import Solver
 from tolcontact.simulation import Block, block_rows, outcomes
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.threads import Sampler
-from tolcontact.statistics.linear_shares import joined_columns
+from tolcontact.statistics.variance_shares import joined_columns
 from tolcontact.variation import GivenDraws
 from tolcontact.variation.draws import Draws
 from tolcontact.vocabulary import GROUPED_BY

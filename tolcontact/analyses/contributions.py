@@ -23,7 +23,7 @@ from tolcontact.compilation import Program
 from tolcontact.method import Solver
 from tolcontact.simulation import Block
 from tolcontact.statistics.intervals import UNDEFINED, Estimate, effective_count
-from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
+from tolcontact.statistics.variance_shares import missed, shapley_effects, sobol_indices
 from tolcontact.workflow.models import Choice, Model
 
 MIN_GROUPS = 17  # fewer are not screened
@@ -137,7 +137,7 @@ def contributions(
     method: Choice | None = None, by: terms.GroupedBy = "contributor", into: str | Path | None = None, client: Any = None,
     progress: Progress | None = None, minutes: float | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Return Sobol' indices of each measure (see tolcontact.statistics.sobol_indices), and the classical linear percentages.
+    """Return Sobol' indices of each measure (see tolcontact.statistics.variance_shares), and the classical linear percentages.
 
         first   (measure, state, group, interval)   share of variance by a group alone, with its 95 % interval
         total   (measure, state, group, interval)   share of variance by a group and its interactions with others

@@ -16,7 +16,7 @@ from tolcontact.discretization import Nominal, NominalPart, discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.limits import Limits
 from tolcontact.method import Solver
-from tolcontact.statistics import intervals, two_samples
+from tolcontact.statistics import intervals
 from tolcontact.statistics.capability import share_outside
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import StatisticRequest
@@ -120,9 +120,9 @@ class Goal:
         if after is before:
             return Estimate(*[float(self.is_spread)] * 3)
         if self.is_spread:
-            return Estimate(*np.sqrt(two_samples.variance_ratio(Sample.of(after), Sample.of(before), paired=True)))
+            return Estimate(*np.sqrt(intervals.variance_ratio(Sample.of(after), Sample.of(before), paired=True)))
         hits = [Sample.of(self.limits.outside(x)) for x in (after, before)]
-        return two_samples.share_shift(*hits, paired=True)
+        return intervals.share_shift(*hits, paired=True)
 
 
 class TrialPositions:

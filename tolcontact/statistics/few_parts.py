@@ -33,7 +33,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.declaration import Population
 from tolcontact.realizations import declaration_of
 from tolcontact.statistics.intervals import CONFIDENCE
-from tolcontact.statistics.linear_shares import required_realizations
+from tolcontact.statistics.variance_shares import required_realizations
 
 WORLDS = 512  # a power of 2: the points of a Sobol' sequence
 MAX_WEIGHTS = 1 << 20  # in memory

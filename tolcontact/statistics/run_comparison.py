@@ -11,7 +11,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.realizations import assembled, declaration_of, is_assembled, pieces, statuses
-from tolcontact.statistics import intervals, two_samples
+from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
 from tolcontact.statistics.summary import summarize
@@ -175,8 +175,8 @@ def _estimates(sample: Sample, baseline: Sample, hits: list[Sample | None], *, p
         return [UNDEFINED] * len(terms.CHANGES_OF_RUNS)
     limited = [x for x in hits if x is not None]
     estimates = {
-        terms.SHIFT: two_samples.shift(sample, baseline, paired=paired),
-        terms.SPREAD_RATIO: intervals.root(two_samples.variance_ratio(sample, baseline, paired=paired)),
-        terms.SHARE_SHIFT: two_samples.share_shift(*limited, paired=paired) if len(limited) == len(hits) else UNDEFINED,
+        terms.SHIFT: intervals.shift(sample, baseline, paired=paired),
+        terms.SPREAD_RATIO: intervals.root(intervals.variance_ratio(sample, baseline, paired=paired)),
+        terms.SHARE_SHIFT: intervals.share_shift(*limited, paired=paired) if len(limited) == len(hits) else UNDEFINED,
     }
     return [estimates[name] for name in terms.CHANGES_OF_RUNS]
