@@ -17,7 +17,8 @@ from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.method import Solver
 from tolcontact.statistics.intervals import UNDEFINED, proportion
-from tolcontact.statistics.rare import NEGLIGIBLE, Tail, either, sufficient_tail
+from tolcontact.statistics.rare import Tail, either, sufficient_tail
+from tolcontact.statistics.rare_searches import NEGLIGIBLE
 from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 

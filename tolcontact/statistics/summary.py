@@ -10,12 +10,10 @@ from tolcontact.declaration import UNITS
 from tolcontact.errors import ArchiveError
 from tolcontact.readable import Pictured
 from tolcontact.realizations import finished, pieces, statuses
-from tolcontact.statistics import contact, convention, intervals
-from tolcontact.statistics.contact import surface_values
-from tolcontact.statistics.few_parts import worlds_of
+from tolcontact.statistics import contact, intervals
+from tolcontact.statistics.few_parts import with_few_parts, worlds_of
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, limits, measure_estimates
-from tolcontact.statistics.parts_intervals import with_few_parts
 from tolcontact.vocabulary import ArchiveVariable
 
 MIN_REALIZATIONS = 2
@@ -91,12 +89,12 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
         terms.CHANGE: changes,
         **_status_values(rows, rigid),
         **_contact_values(rows, combinations),
-        **convention.offset_values(rows),
-        **convention.changes_by_objective(results),
+        **contact.offset_values(rows),
+        **contact.changes_by_objective(results),
         terms.STEPS: _steps(rows),
         terms.PENETRATION: _penetration(rows, rigid),
         **clashes,
-        **surface_values(results, terms.NOTICED_SHARE * smallest),
+        **contact.surface_values(results, terms.NOTICED_SHARE * smallest),
         **_field_values(results),
     }
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs["units"]}}
@@ -104,7 +102,7 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
         _coordinates(rows, combinations)
         | {name: (terms.MEASURE, values) for name, values in notes.items()}
-        | {terms.CLASH: clash_names, terms.BY_OBJECTIVE: convention.other_objectives(results)},
+        | {terms.CLASH: clash_names, terms.BY_OBJECTIVE: contact.other_objectives(results)},
         {
             "title": results.attrs["title"],
             "realizations": count,
