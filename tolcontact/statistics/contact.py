@@ -4,6 +4,7 @@ Also how much a result depends on the objective: offsets of parts from their loc
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,8 +28,12 @@ CLASHES = (terms.CLASHES, terms.CLASH_DEPTH, terms.CLASH_PART, terms.CLASH_OTHER
 def loaded(rows: xr.Dataset) -> np.ndarray:
     """Return the share of realizations with each pair under load, (pair, interval)."""
     counts = np.sum([(piece[terms.CARRYING.name].values > 0).sum(axis=0) for piece in pieces(rows)], axis=0)
-    total = rows.sizes[terms.REALIZATION]
-    return np.array([intervals.proportion_of(int(k), total) for k in counts]).reshape(-1, len(terms.ESTIMATE))
+    return shares(counts.tolist(), rows.sizes[terms.REALIZATION])
+
+
+def shares(counts: Sequence[int], total: int) -> np.ndarray:
+    """Return the shares (n, interval) of counts (n,) among a number of realizations."""
+    return np.array([intervals.proportion_of(count, total) for count in counts]).reshape(-1, len(terms.ESTIMATE))
 
 
 def reactions(rows: xr.Dataset) -> np.ndarray:
@@ -86,8 +91,7 @@ class TouchingShares:
         if not self._realizations:
             return np.full(len(self._counts), np.nan), np.full((len(self._counts), len(terms.BOUNDS)), np.nan), 0
         counts, place = np.unique(self._counts, return_inverse=True)
-        estimates = np.array([intervals.proportion_of(int(count), self._realizations) for count in counts])
-        estimates = np.where(self._is_counted[:, None], estimates.reshape(-1, len(terms.ESTIMATE))[place], np.nan)
+        estimates = np.where(self._is_counted[:, None], shares(counts.tolist(), self._realizations)[place], np.nan)
         return estimates[:, 0], estimates[:, 1:], self._realizations
 
 
@@ -186,9 +190,9 @@ def clashes(rows: xr.Dataset) -> tuple[dict[ArchiveVariable, Any], list[str]]:
 def offset_values(rows: xr.Dataset) -> dict[ArchiveVariable, Any]:
     """Return percentiles of the offset of each part from its locators, and the shares of large ones."""
     parts, total = rows.sizes[terms.PART], rows.sizes[terms.REALIZATION]
-    shares = np.full((2, parts, len(terms.ESTIMATE)), np.nan)
+    beyond = np.full((2, parts, len(terms.ESTIMATE)), np.nan)
     offset = np.full((parts, len(terms.OFFSET_PERCENTILES), len(terms.ESTIMATE)), np.nan)
-    values = {terms.OFFSET: offset, terms.OFFSET_BEYOND: shares[0], terms.OFFSET_UNEXPLAINED: shares[1]}
+    values = {terms.OFFSET: offset, terms.OFFSET_BEYOND: beyond[0], terms.OFFSET_UNEXPLAINED: beyond[1]}
     if terms.LOCATOR_OFFSET.name not in rows:  # an archive of an earlier version
         return values
     variations, columns = rows[terms.LOCATOR_VARIATION.name].values, [v.name for v in (terms.LOCATOR_OFFSET, terms.GAP_MIN)]
@@ -202,7 +206,7 @@ def offset_values(rows: xr.Dataset) -> dict[ArchiveVariable, Any]:
     for part in np.flatnonzero(np.isfinite(variations)).tolist():
         x = Sample.of(column(rows, terms.LOCATOR_OFFSET, part=part))
         offset[part] = intervals.percentiles(x, list(terms.OFFSET_PERCENTILES.values()))
-        shares[:, part] = [intervals.proportion_of(count, total) for count in counts[:, part].tolist()]
+        beyond[:, part] = shares(counts[:, part].tolist(), total)
     return values
 
 

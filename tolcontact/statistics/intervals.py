@@ -103,30 +103,25 @@ def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[
     return _from_sums(estimate, x.count, squares * widening**2, cubes * widening**3, fourths * widening**4)
 
 
-def is_shape_known(x: Sample) -> bool:
-    """Return whether skewness and kurtosis have an interval: their spread depends on moments that small samples do not give."""
-    return x.count >= MIN_SHAPE and x.standardized_moments[4] < MAX_KURTOSIS
-
-
 def skewness(x: np.ndarray | Sample) -> Estimate:
     """Return the third central moment over the cube of the standard deviation; 0 for a symmetric distribution."""
-    x = Sample.of(x)
-    if is_constant(x):
-        return UNDEFINED
-    skew = float(x.standardized_moments[3])
-    if not is_shape_known(x):
-        return Estimate(skew, math.nan, math.nan)
-    return from_standardized_influence(x, skew, [0.5 * skew, -3, -1.5 * skew, 1])
+    return _shape(Sample.of(x), 3)
 
 
 def kurtosis(x: np.ndarray | Sample) -> Estimate:
     """Return the fourth central moment over the square of the variance; 3 for a normal distribution."""
-    x = Sample.of(x)
+    return _shape(Sample.of(x), 4)
+
+
+def _shape(x: Sample, order: int) -> Estimate:
+    """Return a standardized moment. Small samples do not give the moments that its spread depends on."""
     if is_constant(x):
         return UNDEFINED
     skew, kurt = x.standardized_moments[3:5].tolist()
-    if not is_shape_known(x):
-        return Estimate(kurt, math.nan, math.nan)
+    if x.count < MIN_SHAPE or not kurt < MAX_KURTOSIS:
+        return Estimate(skew if order == 3 else kurt, math.nan, math.nan)
+    if order == 3:
+        return from_standardized_influence(x, skew, [0.5 * skew, -3, -1.5 * skew, 1])
     return from_standardized_influence(x, kurt, [kurt, -4 * skew, -2 * kurt, 0, 1])
 
 

@@ -176,7 +176,7 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     is_small = samples < SEARCHABLE
     pilot = score(rng.standard_normal((max(int(PILOT * samples), MIN_PILOT), dimensions))) > 0
     if pilot.sum() >= (MIN_FEW if is_small else MIN_COUNTED):
-        return Tail(_counted(score, dimensions, samples - len(pilot), rng), 1.0)
+        return Tail(intervals.proportion(score(rng.standard_normal((samples - len(pilot), dimensions))) > 0), 1.0)
     budgets = [int(share * samples) for share in SEARCHES]
     searches = [_searched(score, dimensions, sum(budgets) if not leads else budgets[1], rng, inflates=True)]
     if leads:
@@ -186,7 +186,7 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     groups = [halves for search in searches if (halves := _halves(search.points))]
     if not groups:
         if all(estimate.upper == 1.0 for estimate in answers):
-            return Tail(_counted(score, dimensions, budget_drawn, rng), 1.0)
+            return Tail(intervals.proportion(score(rng.standard_normal((budget_drawn, dimensions))) > 0), 1.0)
         return _combined(answers)
     u, weights = _importance(score, dimensions, groups, budget_drawn, rng)
     if not _has_spread_weights(weights):
@@ -215,10 +215,6 @@ def either(tails: Sequence[Tail]) -> Tail:
     reach_below, reach_above = (math.sqrt(float(((estimates[:, k] - estimates[:, 0]) ** 2).sum())) for k in (1, 2))
     bounds = max(total - reach_below, 0.0), min(total + reach_above, 1.0)
     return Tail(Estimate(total, *bounds), max(tail.disagreement for tail in tails))
-
-
-def _counted(score: Score, dimensions: int, count: int, rng: np.random.Generator) -> Estimate:
-    return intervals.proportion(score(rng.standard_normal((count, dimensions))) > 0)
 
 
 def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generator, *, inflates: bool) -> SearchResult:

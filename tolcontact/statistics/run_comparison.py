@@ -83,17 +83,8 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
 def _shared_measures(summaries: Mapping[str, xr.Dataset]) -> list[str]:
     """Return the measures that all runs have with the same units and quantity, in the order of the first run."""
     columns = (terms.MEASURE, terms.MEASURE_UNITS.name, terms.QUANTITY.name)
-    tables = [
-        {str(name): (units, quantity) for name, units, quantity in zip(*(summary[c].values for c in columns), strict=True)}
-        for summary in summaries.values()
-    ]
-
-    def is_shared(name: str) -> bool:
-        entries = [table.get(name) for table in tables]
-        units, quantities = ({entry[k] for entry in entries if entry is not None} for k in (0, 1))
-        return None not in entries and len(units) == 1 and len(quantities) == 1
-
-    return [name for name in tables[0] if is_shared(name)]
+    tables = [list(zip(*(summary[column].values for column in columns), strict=True)) for summary in summaries.values()]
+    return [str(row[0]) for row in tables[0] if all(row in table for table in tables)]
 
 
 def _left_out(summaries: Mapping[str, xr.Dataset], shared: list[str]) -> str:

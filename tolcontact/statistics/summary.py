@@ -17,6 +17,13 @@ from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues,
 from tolcontact.vocabulary import ArchiveVariable
 
 MIN_REALIZATIONS = 2
+TEXTS = (
+    terms.NOT_WATCHED,
+    terms.STANDARD,
+    terms.STORED_COORDINATES,
+    terms.ELASTIC_PARTS,
+    terms.CORRELATIONS,
+)  # attributes of runs
 
 
 class Summary(xr.Dataset):  # type: ignore[no-untyped-call]
@@ -88,7 +95,9 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
         terms.STATISTIC_VALUE: statistics,
         terms.CHANGE: changes,
         **_status_values(rows, rigid),
-        **_contact_values(rows, combinations),
+        terms.CARRIED: contact.loaded(rows),
+        terms.PAIR_REACTION: contact.reactions(rows),
+        terms.CARRIED_TOGETHER: contact.shares([times for _, times in combinations], count),
         **contact.offset_values(rows),
         **contact.changes_by_objective(results),
         terms.STEPS: _steps(rows),
@@ -106,17 +115,14 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
         {
             "title": results.attrs["title"],
             "realizations": count,
-            "samples": _planned_samples(results, count),
+            # With rows that were selected from an archive, there are no others.
+            "samples": int(results.attrs["samples"]) if count == int(results.attrs["realizations"]) else count,
             **{name: results.attrs[name] for name in terms.METHOD_ATTRIBUTES},
             "search": results.attrs["search"],
             "datum_shifts": ", ".join(_datum_shifts(results)),
             "smallest_range": smallest,
             terms.INTERFERENCE_DEPTH: float(results.attrs.get(terms.INTERFERENCE_DEPTH, np.nan)),
-            terms.NOT_WATCHED: str(results.attrs.get(terms.NOT_WATCHED, "")),
-            terms.STANDARD: str(results.attrs.get(terms.STANDARD, "")),
-            terms.STORED_COORDINATES: str(results.attrs.get(terms.STORED_COORDINATES, "")),
-            terms.ELASTIC_PARTS: str(results.attrs.get(terms.ELASTIC_PARTS, "")),
-            terms.CORRELATIONS: str(results.attrs.get(terms.CORRELATIONS, "")),
+            **{name: str(results.attrs.get(name, "")) for name in TEXTS},
         },
     )
 
@@ -177,28 +183,25 @@ def _status_values(rows: xr.Dataset, rigid: np.ndarray) -> dict[ArchiveVariable,
     }
 
 
-def _contact_values(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[ArchiveVariable, Any]:
-    """Return how often pairs are under load, alone and in combinations, and their reactions."""
-    total = rows.sizes[terms.REALIZATION]
-    shares = np.array([intervals.proportion_of(count, total) for _, count in combinations])
-    return {
-        terms.CARRIED: contact.loaded(rows),
-        terms.PAIR_REACTION: contact.reactions(rows),
-        terms.CARRIED_TOGETHER: shares.reshape(-1, len(terms.ESTIMATE)),
-    }
-
-
 def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
-    """Return the extremes of the displacement fields, and the number of realizations that all of them cover."""
+    """Return the extremes of the displacement fields, and the number of realizations that all of them cover.
+
+    The extremes (part, state, extreme, interval) are 6 sigma of |u|, and its interval, where a field is least and largest.
+    """
     parts = [str(part) for part in results.to_dataset()[terms.PART].values]
     fields = [results["field"].children[terms.group_of(part)].to_dataset() for part in parts]
     summed = [int(field[terms.FIELD_REALIZATIONS.name]) for field in fields]
-    extremes = [_field_extremes(field, count) for field, count in zip(fields, summed, strict=True)]
     magnitudes = [int(field[terms.MAGNITUDE_REALIZATIONS.name]) for field in fields]
+    extremes = np.full((len(parts), len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)), np.nan)
+    for field, count, extremes_of_part in zip(fields, summed, extremes, strict=True):
+        six_sigma = field[terms.FIELD_SIX_SIGMA.name].sel({terms.COMPONENT: "magnitude"}).values
+        for state, values in enumerate(six_sigma):
+            if count and np.isfinite(values).all():
+                vertices = [values.argmin(), values.argmax()]
+                extremes_of_part[state, :, 0] = values[vertices]
+                extremes_of_part[state, :, 1:] = field[terms.FIELD_INTERVAL.name].values[state, vertices]
     return {
-        terms.FIELD_EXTREME: np.array(extremes).reshape(
-            len(parts), len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)
-        ),
+        terms.FIELD_EXTREME: extremes,
         terms.REALIZATIONS_IN_FIELDS: min(summed, default=0),
         terms.REALIZATIONS_IN_MAGNITUDES: min([*magnitudes, *summed], default=0),
     }
@@ -242,29 +245,5 @@ def _datum_shifts(results: xr.DataTree) -> list[str]:
     """Return the features with a datum at maximum or least material condition, as part.feature."""
     sample = results["sample"].to_dataset()
     labels = zip(sample[terms.CONTRIBUTOR].values, sample[terms.DISTRIBUTION.name].values, strict=True)
-    shifted = [
-        str(label).rpartition(".")[0]
-        for label, distribution in labels
-        if "(M)" in str(distribution) or "(L)" in str(distribution)
-    ]
+    shifted = [str(label).rpartition(".")[0] for label, text in labels if "(M)" in str(text) or "(L)" in str(text)]
     return list(dict.fromkeys(shifted))
-
-
-def _planned_samples(results: xr.DataTree, count: int) -> int:
-    """Return the number of realizations that the run was started with, or `count` if rows were selected from an archive."""
-    return int(results.attrs["samples"]) if count == int(results.attrs["realizations"]) else count
-
-
-def _field_extremes(field: xr.Dataset, count: int) -> np.ndarray:
-    """Return 6 sigma of |u|, and its interval, where a field of `count` realizations is least and largest.
-
-    The extremes are (state, extreme, interval).
-    """
-    extremes = np.full((len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)), np.nan)
-    six_sigma = field[terms.FIELD_SIX_SIGMA.name].sel({terms.COMPONENT: "magnitude"}).values
-    for state, values in enumerate(six_sigma):
-        if count and np.isfinite(values).all():
-            vertices = [values.argmin(), values.argmax()]
-            extremes[state, :, 0] = values[vertices]
-            extremes[state, :, 1:] = field[terms.FIELD_INTERVAL.name].values[state, vertices]
-    return extremes
