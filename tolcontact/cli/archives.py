@@ -58,13 +58,13 @@ def summary(
 
 def _first_order_variances(results: xr.DataTree) -> np.ndarray:
     """Return first-order variances of a run. Few reports need the model, and all that it takes to build it."""
-    variances: np.ndarray = import_module("tolcontact.analyses.first_order").first_order_variances(results)
+    variances: np.ndarray = import_module("tolcontact.analyses.rebuilt").first_order_variances(results)
     return variances
 
 
 def _rigid_values(results: xr.DataTree) -> Any:
     """Return values of a run with rigid parts in place of elastic ones."""
-    return import_module("tolcontact.analyses.rigid_parts").rigid_values(results)
+    return import_module("tolcontact.analyses.rebuilt").rigid_values(results)
 
 
 @app.command(epilog=examples("report run.nc", "report run.nc --out page.html", "report run.nc --xlsx tables.xlsx"))
