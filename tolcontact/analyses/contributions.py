@@ -94,25 +94,21 @@ def _answers(
     slopes = total_derivatives(program)
     linear = [_linear_shares(program, deviations, row, columns) for row in slopes]
     unknown = np.full((len(slopes), len(terms.STATES), len(groups), len(terms.ESTIMATE)), np.nan)
-    unknown_effects = np.full((*unknown.shape[:2], len(units), len(terms.ESTIMATE)), np.nan)
+    effects = np.full((*unknown.shape[:2], len(units), len(terms.ESTIMATE)), np.nan)
     is_minor, totals = unscreened = np.zeros(len(groups), dtype=bool), unknown[..., 0]
 
     def answer(
         coarse: str, count: int = 0, arrays: Any = None, screening: tuple[np.ndarray, np.ndarray] = unscreened,
-        effects: np.ndarray = unknown_effects,
+        shapley: np.ndarray = effects,
     ) -> Answer:  # fmt: skip
         """Return the answer from arrays of `count` base realizations; without any, it has linear shares only."""
-        values: dict[str, Any] = {
-            "first": unknown,
-            "total": unknown,
-            "minor_total": unknown[:, :, 0],
-            "missed": unknown[:, :, 0],
-        }
+        values = dict[str, Any].fromkeys(("first", "total"), unknown)
+        values |= dict.fromkeys(("minor_total", "missed"), unknown[:, :, 0])
         if count:
             measured, firsts, _ = arrays
             values = _indices(measured, program.accuracies, *screening)
             values["missed"] = _missed(program, measured[:, 0], firsts[:, 0], slopes)
-        values |= {"minor": screening[0].astype(np.int8), "shapley": effects, "linear": linear, "by_status": analysis.statuses}
+        values |= {"minor": screening[0].astype(np.int8), "shapley": shapley, "linear": linear, "by_status": analysis.statuses}
         labels = {terms.GROUP: list(groups), terms.UNIT: list(units)}
         return Answer(values, labels, {"base_realizations": count, "realizations": analysis.simulated, "by": by}, coarse)
 
@@ -140,10 +136,9 @@ def _answers(
     if released:
         measured, _ = analysis.simulate_design(released, samples)
         positions = released.positions(analysis.seed, 0, samples)
-        effects = _by_measure(measured, program.accuracies, lambda f, accuracy: shapley_effects(f, positions, accuracy))
-        yield partial(answer, "", samples, arrays, screening, np.array(effects))
-    else:
-        yield partial(answer, "", samples, arrays, screening)
+        shapley = _by_measure(measured, program.accuracies, lambda f, accuracy: shapley_effects(f, positions, accuracy))
+        effects = np.array(shapley)
+    yield partial(answer, "", samples, arrays, screening, effects)
 
 
 def _by_measure(measured: np.ndarray, accuracies: np.ndarray, function: Callable[[np.ndarray, float], Any]) -> list[list[Any]]:
