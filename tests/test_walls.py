@@ -56,8 +56,7 @@ LAZY = {
     "tolcontact.fasteners": ("__init__.py",),  # when a script asks
     "tolcontact.pmi": ("__init__.py",),  # when a script asks
     "tolcontact.report.notebook": ("__init__.py",),  # when a notebook asks
-    "tolcontact.analyses.first_order": ("cli/archives.py",),  # few reports need models
-    "tolcontact.analyses.rigid_parts": ("cli/archives.py",),  # those of elastic parts
+    "tolcontact.analyses.rebuilt": ("cli/archives.py",),  # few reports need models
 }
 # Slow to import: "import scipy" is enough, and imports them when they are first used.
 SLOW = ("scipy.optimize", "scipy.stats")

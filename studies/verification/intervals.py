@@ -16,10 +16,9 @@ from scipy import special, stats
 
 from studies.tables import markdown, replace, tables
 from tolcontact.limits import Limits
-from tolcontact.statistics import capability, intervals, two_samples
-from tolcontact.statistics.linear_shares import linear_shares, required_realizations
+from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.sample import Sample
-from tolcontact.statistics.sobol_indices import sobol_indices
+from tolcontact.statistics.variance_shares import linear_shares, required_realizations, sobol_indices
 from tolcontact.variation.plans import planned_numbers
 from tolcontact.vocabulary import LATIN_HYPERCUBE, REPLICATE, SOBOL
 
@@ -129,7 +128,7 @@ def paired_figures(x, other, truth):
     rng = np.random.default_rng(zlib.crc32(x.tobytes()))
     hits = [rng.random(len(x)) < 0.05]
     hits.append(np.where(rng.random(len(x)) < CHANGED, rng.random(len(x)) < 0.05, hits[0]))
-    shift = two_samples.share_shift(*map(Sample.of, hits), paired=True)
+    shift = intervals.share_shift(*map(Sample.of, hits), paired=True)
     table = {"shift of a share": (shift, 0.0)}
     if len(x) >= required_realizations(2) and np.ptp(x) * np.ptp(other) > 0:
         z = (np.column_stack([x, other]) - truth.mean) / np.sqrt(truth.variance)

@@ -13,8 +13,7 @@ from scipy import stats
 from studies import tables
 from tolcontact.limits import Limits
 from tolcontact.statistics import capability, intervals
-from tolcontact.statistics.few_parts import MeasuredRows, Worlds
-from tolcontact.statistics.parts_intervals import NAMES, widened
+from tolcontact.statistics.few_parts import NAMES, MeasuredRows, Worlds, widened
 from tolcontact.statistics.sample import Sample
 
 FIGURES = "mean", "6 sigma", "outside limits", "Ppk as normal"

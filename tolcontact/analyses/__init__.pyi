@@ -1,5 +1,5 @@
 from .allocate import allocate as allocate
-from .answers import Stopped as Stopped
+from .analysis import Stopped as Stopped
 from .contributions import contributions as contributions
 from .relocate import relocate as relocate
 from .seating import seating as seating

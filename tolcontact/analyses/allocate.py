@@ -11,9 +11,8 @@ import scipy
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress, owners
-from tolcontact.analyses.answers import Answer
-from tolcontact.analyses.costs import MAX_FACTOR, MIN_FACTOR, Cost, Curves, cheapest, cost_of, curves_of
+from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Answer, Progress, owners
+from tolcontact.analyses.costs import MAX_FACTOR, MIN_FACTOR, Cost, Curve, cheapest, constant, curves_of
 from tolcontact.analyses.scaled_trials import (
     MIN_DECISIVE,
     STEP,
@@ -82,8 +81,9 @@ def allocate(
     )  # fmt: skip
     requirements = requirements_of(require, program := analysis.program, samples)
     curves = curves_of(costs, groups := _groups(program, by), ranges := _ranges(program, groups), program)
-    trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), requirements, seed, samples)
-    prices = Curves(curves.get(name, 0.0) for name in groups)
+    analysis.expect(_expected(samples, len(groups)))
+    trials = ScaledTrials(analysis, list(groups.values()), requirements)
+    prices = [curves.get(name, constant(0.0)) for name in groups]
     search = Search(trials, prices, np.array([name in curves for name in groups]))
     return analysis.finest(_answers(search, groups, ranges, by))
 
@@ -93,7 +93,7 @@ def _answers(
 ) -> Iterator[Callable[[], Answer]]:
     """Yield present ranges, those of the search as they change, and the allocated ones."""
     trials, requirements = search.trials, search.trials.requirements
-    samples, count = trials.samples, len(trials.engine.program.nominal.measures)
+    samples, count = trials.analysis.samples, len(trials.analysis.program.nominal.measures)
     unknown = np.full((count, len(terms.EFFECTS), len(groups), len(terms.ESTIMATE)), np.nan)
 
     def answer(trial: Trial, before: list[Estimate], fresh: int, effect: np.ndarray = unknown) -> Answer:
@@ -101,22 +101,24 @@ def _answers(
         values = {
             "range": np.array(ranges)[:, None] * factors,
             "factor": factors[:, 1],
-            "cost": [[cost_of(curve, factor) for factor in row] for curve, row in zip(search.curves, factors, strict=True)],
+            "cost": [[curve(factor) for factor in row] for curve, row in zip(search.curves, factors, strict=True)],
             "kept": np.array([before, _estimates(requirements, trial)]).swapaxes(0, 1),
-            "met": (_sure_margins(requirements, trial.corrected) >= 0).astype(np.int8),
+            "met": np.array([requirement.sure_margin(trial.corrected) >= 0 for requirement in requirements], dtype=np.int8),
             "required": [requirement.value for requirement in requirements],
             "idle": search.idle.astype(np.int8) if search.tested_rows else np.zeros(len(groups), dtype=np.int8),
             "effect": effect,
         }
+        chosen = zip(groups, search.curves, trial.logs, strict=True)
+        choices = [f"{name}: {curve.names[curve.nearest(log)]}" for name, curve, log in chosen if curve.names]
         labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
         attributes = {
             "by": by, "samples": samples, "fresh": fresh, "idle_tried": search.tested_rows, "floor": MIN_FACTOR,
-            "ceiling": MAX_FACTOR, "choices": search.curves.names(trial.logs, list(groups)),
+            "ceiling": MAX_FACTOR, "choices": ", ".join(choices),
         }  # fmt: skip
         return Answer(values, labels, attributes, COARSE if trial.logs.any() else PRESENT)
 
     nothing = np.zeros(len(search.priced))
-    search.latest = trials.trial(search.curves.narrowed(nothing))
+    search.latest = trials.trial(search.narrowed(nothing))
     present = _estimates(requirements, search.latest if not search.latest.logs.any() else trials.trial(nothing))
     yield lambda: answer(search.latest, present, samples)
     before = _estimates(requirements, trials.trial(nothing, verification=1))
@@ -159,26 +161,18 @@ def _allocated(search: "Search", expected: int) -> Trial:
     for number in range(VERIFICATIONS):
         searched = search.least_cost(searched, aims)
         fresh = trials.trial(searched.logs, verification=2 + number)
-        missing = -_sure_margins(requirements, fresh.corrected)
+        missing = -np.array([requirement.sure_margin(fresh.corrected) for requirement in requirements])
         if (missing <= 0).all():
             return fresh
         aims += AIM_GAIN * np.where(np.isfinite(missing), np.maximum(missing, 0.0), 0.0)
-        trials.engine.total += expected
+        trials.analysis.total += expected
     searched = search.least_missing(searched)
     search.release(searched)
     return trials.trial(searched.logs, verification=2 + VERIFICATIONS)
 
 
 def _estimates(requirements: Sequence[Requirement], trial: Trial) -> list[Estimate]:
-    return [requirement.estimate(trial.corrected[:, requirement.measure]) for requirement in requirements]
-
-
-def _margins(requirements: Sequence[Requirement], corrected: np.ndarray) -> np.ndarray:
-    return np.array([requirement.margin(corrected[:, requirement.measure]) for requirement in requirements])
-
-
-def _sure_margins(requirements: Sequence[Requirement], corrected: np.ndarray) -> np.ndarray:
-    return np.array([requirement.sure_margin(corrected[:, requirement.measure]) for requirement in requirements])
+    return [requirement.estimate(trial.corrected) for requirement in requirements]
 
 
 @dataclass(eq=False)
@@ -190,7 +184,7 @@ class Search:
     """
 
     trials: ScaledTrials
-    curves: Curves
+    curves: Sequence[Curve]
     priced: np.ndarray
     latest: Trial = field(init=False)  # the best trial so far
     chosen: bool = field(init=False, default=False)  # whether groups with a table keep their choices
@@ -199,22 +193,27 @@ class Search:
 
     def __post_init__(self) -> None:
         self.idle = self.priced.copy()
+        self.has_table = np.array([bool(curve.names) for curve in self.curves])
+        self.least, self.most = np.array([curve.ends for curve in self.curves]).T
+
+    def narrowed(self, logs: np.ndarray) -> np.ndarray:
+        """Return logarithms of the factors (group,) with the next narrower choices of tables."""
+        return np.array([curve.narrowed(log) for curve, log in zip(self.curves, logs, strict=True)])
 
     @property
     def is_free(self) -> np.ndarray:
         """Whether the range of a group may change, (group,)."""
-        return self.priced & ~self.idle & ~(self.chosen & self.curves.has_table)
+        return self.priced & ~self.idle & ~(self.chosen & self.has_table)
 
     def cost(self, logs: np.ndarray) -> float:
         """Return the cost of the groups that may change, at logarithms of the factors (group,)."""
         factors = zip(self.curves, np.exp(logs), self.priced, strict=True)
-        return math.fsum(cost_of(curve, factor) for curve, factor, is_priced in factors if is_priced)
+        return math.fsum(curve(factor) for curve, factor, is_priced in factors if is_priced)
 
     def release(self, trial: Trial) -> bool:
         """Free the ranges of idle groups that have an influence at a trial; return whether there are any."""
         before, self.tested_rows = self.idle, int(trial.is_resolved.sum())
-        lower, upper = self.curves.ends
-        self.idle = self.trials.idle(trial, before, (math.exp(lower.min()), math.exp(upper.max())))
+        self.idle = self.trials.idle(trial, before, (math.exp(self.least.min()), math.exp(self.most.max())))
         return bool((before & ~self.idle).any())
 
     def least_cost(self, trial: Trial, aims: np.ndarray) -> Trial:
@@ -225,7 +224,7 @@ class Search:
         trial = self._descend(trial, aims)
         while self.release(trial):
             trial = self._descend(trial, aims)
-        return self._choose(trial, aims) if (self.curves.has_table & self.is_free).any() else trial
+        return self._choose(trial, aims) if (self.has_table & self.is_free).any() else trial
 
     def _choose(self, trial: Trial, aims: np.ndarray) -> Trial:
         """Return the trial of least cost with choices of tables, of those that are best by approximations of the margins.
@@ -235,9 +234,9 @@ class Search:
         """
         best, tried = None, set[bytes]()
         for _ in range(MAX_CHOICES):
-            margins = _margins(self.trials.requirements, trial.corrected) - aims
+            margins = self._margins(trial) - aims
             logs = cheapest(self.curves, trial.logs, self.is_free, margins, self._slopes(trial))
-            logs = np.where(self.is_free, self.curves.ends[0], trial.logs) if logs is None else logs
+            logs = np.where(self.is_free, self.least, trial.logs) if logs is None else logs
             if logs.tobytes() in tried:
                 break
             tried.add(logs.tobytes())
@@ -245,10 +244,10 @@ class Search:
             self.chosen = True
             trial = self._descend(trial, aims) if self.is_free.any() else trial
             self.chosen = False
-            is_met = (_margins(self.trials.requirements, trial.corrected) >= aims).all()
+            is_met = (self._margins(trial) >= aims).all()
             if is_met and (best is None or self.cost(trial.logs) < self.cost(best.logs)):
                 best = trial
-        return best or self.trials.trial(np.where(self.is_free, self.curves.ends[0], trial.logs))
+        return best or self.trials.trial(np.where(self.is_free, self.least, trial.logs))
 
     def _descend(self, trial: Trial, aims: np.ndarray) -> Trial:
         """Return the trial of least cost that is reached by steps from a trial.
@@ -258,7 +257,7 @@ class Search:
         are then unresolved than a requirement permits outside, unless there were as many before.
         """
         radius = FIRST_RADIUS
-        margins, slopes = _margins(self.trials.requirements, trial.corrected) - aims, None
+        margins, slopes = self._margins(trial) - aims, None
         allowed = min(requirement.share for requirement in self.trials.requirements) * len(trial.is_resolved)
         most_unresolved = max(int(allowed), int((~trial.is_resolved).sum()))
         for _ in range(MAX_STEPS):
@@ -274,7 +273,7 @@ class Search:
             if candidate is None:
                 radius /= 2
                 continue
-            candidate_margins = _margins(self.trials.requirements, candidate.corrected) - aims
+            candidate_margins = self._margins(candidate) - aims
             merit = self._merit(trial.logs, margins, penalty)
             gain = merit - self._merit(logs, candidate_margins, penalty)
             if gain > MIN_GAIN * abs(merit):
@@ -293,13 +292,14 @@ class Search:
         Margins lead to points where a quantile is near its limit, which may be far from most values.
         """
         logs = np.log(COMMON_FACTORS[::-1])  # the widest that miss nothing
-        common = [self.curves.narrowed(np.where(self.is_free, log, trial.logs)) for log in logs]
+        common = [self.narrowed(np.where(self.is_free, log, trial.logs)) for log in logs]
         return min([trial, *map(self.trials.trial, common)], key=self._missing)
 
     def _missing(self, trial: Trial) -> float:
-        return math.fsum(
-            requirement.shortfall(trial.corrected[:, requirement.measure]) for requirement in self.trials.requirements
-        )
+        return math.fsum(requirement.shortfall(trial.corrected) for requirement in self.trials.requirements)
+
+    def _margins(self, trial: Trial) -> np.ndarray:
+        return np.array([requirement.margin(trial.corrected) for requirement in self.trials.requirements])
 
     def _merit(self, logs: np.ndarray, margins: np.ndarray, penalty: np.ndarray) -> float:
         return self.cost(logs) + float(penalty @ np.maximum(-margins, 0))
@@ -311,15 +311,14 @@ class Search:
         resolved, and the measures of the others do not change.
         """
         corrected, slopes = trial.corrected, np.zeros((len(self.trials.requirements), len(trial.logs)))
-        rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.trials.requirements]))
+        rows = np.unique(np.concatenate([requirement.decisive(corrected) for requirement in self.trials.requirements]))
         rows, groups = rows[trial.is_resolved[rows]], np.flatnonzero(self.is_free)
         of_signs = [self.trials.changes(trial, groups, rows, trial.logs + step) for step in (STEP, -STEP)]
         for group, (wider, wider_values), (narrower, narrower_values) in zip(groups, *of_signs, strict=True):
             wide, narrow = corrected.copy(), corrected.copy()
             wide[wider], narrow[narrower] = wider_values, narrower_values
-            for row, requirement in enumerate(self.trials.requirements):
-                margins = [requirement.smooth_margin(x[:, requirement.measure]) for x in (wide, narrow)]
-                slopes[row, group] = (margins[0] - margins[1]) / (2 * STEP)
+            margins = [[requirement.smooth_margin(x) for requirement in self.trials.requirements] for x in (wide, narrow)]
+            slopes[:, group] = np.subtract(*np.array(margins)) / (2 * STEP)
         return slopes
 
     def _step(self, margins: np.ndarray, slopes: np.ndarray, logs: np.ndarray, radius: float) -> np.ndarray:
@@ -334,9 +333,8 @@ class Search:
         def approximate(point: np.ndarray) -> np.ndarray:
             return np.asarray(margins + slopes @ (np.exp(2 * (point - logs)) - 1) / 2)
 
-        least, most = self.curves.ends
-        lower = np.where(self.is_free, np.maximum(logs - radius, least), logs)
-        upper = np.where(self.is_free, np.minimum(logs + radius, most), logs)
+        lower = np.where(self.is_free, np.maximum(logs - radius, self.least), logs)
+        upper = np.where(self.is_free, np.minimum(logs + radius, self.most), logs)
         bounds = scipy.optimize.Bounds(lower, upper)
         solution = scipy.optimize.minimize(
             self.cost, logs, method="SLSQP", bounds=bounds, constraints={"type": "ineq", "fun": approximate},

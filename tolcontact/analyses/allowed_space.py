@@ -12,7 +12,7 @@ import scipy
 
 from tolcontact.declaration import Tolerance
 from tolcontact.features.freedoms import TAIL, Freedom
-from tolcontact.statistics.linear_shares import joined_columns
+from tolcontact.statistics.variance_shares import joined_columns
 from tolcontact.variation.draws import Draws
 from tolcontact.variation.spreads import ComponentZone
 
@@ -49,7 +49,8 @@ class RoundZone:
 
     def reach(self, points: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Return the shares (n,), at most 1, of steps (n, contributor) from points (n, contributor) that stay in the zone."""
-        start, along = self._rows_at(points), np.einsum("pec,nc->npe", self._zone.rows, step[:, self.components])
+        offsets = points[:, self.components] - self.middle
+        start, along = (np.einsum("pec,nc->npe", self._zone.rows, x) for x in (offsets, step[:, self.components]))
         half = self._half(points)
         grows = self._half(points + step) - half
         # The least t at which any |start + t along| is half + t grows.
@@ -87,10 +88,6 @@ class RoundZone:
         if zone.sizes is None:
             return np.full((len(points), len(zone.rows)), zone.width / 2)
         return np.asarray((zone.width + zone.growth * (points @ self._drive[:, zone.sizes] - zone.limit)) / 2)
-
-    def _rows_at(self, points: np.ndarray) -> np.ndarray:
-        """Return the rows of the zone (n, point, entry) at points (n, contributor)."""
-        return np.asarray(np.einsum("pec,nc->npe", self._zone.rows, points[:, self.components] - self.middle))
 
 
 def _normals(row: np.ndarray, position: np.ndarray | None) -> np.ndarray:

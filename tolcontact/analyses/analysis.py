@@ -1,24 +1,33 @@
-"""The base of all analyses: checks, the engine that simulates, groups of contributors, the dataset and its storage."""
+"""The base of all analyses: checks, simulations, answers of growing accuracy, groups of contributors, dataset and storage.
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+An analysis is a sequence of answers. The first ones take little time, and the last one is complete. An analysis that is
+stopped, or whose time ends, leaves its latest answer, which says so. Each is a function that makes the answer from what is
+known when it is called, so an answer that nobody asks for takes no time.
+"""
+
+import copy
+import logging
+import math
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as terms
-from tolcontact.analyses.answers import Answer, Answers, Stopped
-from tolcontact.analyses.designs import Design
+from tolcontact import interrupts, vocabulary as terms
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError, check_choice
 from tolcontact.features.freedoms import FORM
 from tolcontact.method import Solver
+from tolcontact.report import brief_lines
 from tolcontact.simulation import Block, block_rows, outcomes
-from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
+from tolcontact.simulation.cluster import mapping, threads_of
 from tolcontact.simulation.threads import Sampler
-from tolcontact.statistics.linear_shares import joined_columns
+from tolcontact.statistics.variance_shares import joined_columns
 from tolcontact.variation import GivenDraws
 from tolcontact.variation.draws import Draws
 from tolcontact.vocabulary import GROUPED_BY
@@ -27,41 +36,122 @@ from tolcontact.workflow.models import Choice, Model, check_affordable, check_co
 MAX_ROWS_OF_BODIES = 8192  # realizations of a block, times the bodies that contact couples: a block ends within seconds
 MIN_BLOCKS = 8  # for few realizations, so that they occupy all processors
 VERIFICATION_FACTOR = 4  # realizations of a fresh run, in multiples of samples
+SPREAD_SAMPLES = 1 << 14  # realizations for the spreads of contributors
+LONG = 30_000  # realizations at most: with more to come, answers are shown on the way
+NEXT_LOOK, MIN_LOOK = 2.0, 20.0  # an answer is shown when this many times the time of the previous one has passed; at least [s]
+MIN_STAGE, MIN_BASE = 500, 4  # realizations of the first stage, and its base realizations
 
 Progress = Callable[[int, int], None]  # called with the number of finished steps, and the total
 Observer = Callable[[Block], tuple[Any, ...]]  # returns arrays of a block; the last one is the statuses (n,)
-SPREAD_SAMPLES = 1 << 14  # realizations for the spreads of contributors
+
+log = logging.getLogger(__name__)
 
 
-class Engine:
-    """Simulations of a program.
+class Answer(NamedTuple):
+    """The answer of an analysis.
+
+    values      array for each variable of the record
+    labels      labels of dimensions that are neither in the vocabulary nor in the model
+    attributes  in addition to the title and the settings
+    coarse      what the answer rests on, in words, if it is not complete
+    units       units of the only measure, where no dimension lists measures
+    """
+
+    values: Mapping[str, Any]
+    labels: Mapping[str, Sequence[str]]
+    attributes: Mapping[str, Any]
+    coarse: str = ""
+    units: str | None = None
+
+
+class Stopped(KeyboardInterrupt):
+    """The user stopped an analysis that already had an answer, its `dataset`.
+
+    `try: tc.analyses.tails("model.py")`, then `except tc.analyses.Stopped as stop: print(stop.dataset.probability)`
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        super().__init__(dataset.attrs[terms.COARSE])
+        self.dataset = dataset
+
+
+class OutOfTime(Exception):
+    """The time of an analysis has ended."""
+
+
+class Design(ABC):
+    """Draws with several realizations for each base realization: realization k size + m is member m of base realization k.
+
+    size   number of realizations of each base realization
+    """
+
+    size: int
+
+    @abstractmethod
+    def members(self, seed: int, start: int, stop: int) -> np.ndarray:
+        """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
+
+    def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
+        """Return deviations (realization, contributor); see Draws."""
+        base = start // self.size
+        members = self.members(seed, base, -(-stop // self.size))
+        return members.reshape(-1, members.shape[2])[start - base * self.size : stop - base * self.size]
+
+
+class Analysis:
+    """A question about one model, its simulations, and its answer: a dataset that can be stored in an archive.
+
+    All options are checked before anything is simulated; without `samples` nothing is. Without an answer when its `minutes`
+    have passed, the analysis continues to the first one. Raises ModelError, ArchiveError, OptionError for invalid arguments.
 
     statuses  (status_meaning,) int: number of realizations simulated so far, by their status
     total     number of realizations that `progress` refers to; an analysis may revise it
     """
 
     def __init__(
-        self, program: Program, blocks: MapBlocks, *, progress: Progress | None = None, total: int = 0,
-        answers: Answers | None = None,
+        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int | None = None, seed: int = 1,
+        solver: Solver | None = None, method: Choice | None = None, into: str | Path | None = None, client: Any = None,
+        progress: Progress | None = None, minutes: float | None = None,
     ) -> None:  # fmt: skip
-        self.program = program
-        bodies = max((len(group.group.free) for group in program.groups), default=0)
-        self._rows = min(block_rows(program), max(MAX_ROWS_OF_BODIES // max(bodies, 1), MIN_BLOCKS))
-        self.statuses = np.zeros(len(terms.STATUS_MEANINGS), dtype=int)
-        self._blocks, self._progress, self.total, self._answers = blocks, progress, total, answers
+        self._started = time.monotonic()
+        if minutes is not None and not (isinstance(minutes, int | float) and 0 < minutes < math.inf):
+            raise OptionError(f"minutes is {minutes!r}; expected a positive number")
+        if samples is not None:
+            check_counts(samples=samples, seed=seed)
+        self.record, self.program, self._into = record, program_of(model, solver, method), into
+        self.samples, self.seed, self.progress, self._minutes = samples or 0, seed, progress, minutes
+        self._blocks, self._client = mapping(client), client
+        if into is not None:
+            check_room_for(into, record, self.program)
+        bodies = max((len(group.group.free) for group in self.program.groups), default=0)
+        self._rows = min(block_rows(self.program), max(MAX_ROWS_OF_BODIES // max(bodies, 1), MIN_BLOCKS))
+        self.statuses, self.total = np.zeros(len(terms.STATUS_MEANINGS), dtype=int), 0
+        self._latest: Callable[[], Answer] | None = None
+        self._next_look = 0.0
+
+    @property
+    def assembly(self) -> str:
+        """The name of the assembly."""
+        return self.program.nominal.assembly.name
 
     @property
     def simulated(self) -> int:
         """The number of realizations so far."""
         return int(self.statuses.sum())
 
-    @property
-    def unresolved(self) -> int:
-        """The number of realizations so far that were not resolved."""
-        return int(self.statuses[list(terms.UNRESOLVED)].sum())
+    def of(self, program: Program) -> "Analysis":
+        """Return the same analysis of another program, without progress, and with nothing simulated."""
+        analysis = copy.copy(self)
+        analysis.program, analysis.statuses, analysis.progress = program, np.zeros_like(self.statuses), None
+        return analysis
+
+    def expect(self, total: int) -> None:
+        """Set the total of realizations. Raises OptionError if that many would take too much time or memory."""
+        check_affordable(self.program, samples=total, seed=self.seed, threads=threads_of(self._client))
+        self.total = total
 
     def simulate(
-        self, samples: int, *, seed: int = 0, start: int = 0, draws: Sampler | None = None, observe: Observer = outcomes
+        self, samples: int, *, start: int = 0, draws: Sampler | None = None, observe: Observer = outcomes
     ) -> tuple[np.ndarray, ...]:
         """Simulate `samples` realizations, starting with number `start`, and return the joined results of `observe`.
 
@@ -70,14 +160,13 @@ class Engine:
         observed = []
         block = min(self._rows, max(self._rows, samples) // MIN_BLOCKS)  # for any number of threads or workers
         for arrays in self._blocks(
-            observe, self.program, samples=start + samples, start=start, seed=seed, draws=draws, block=block
+            observe, self.program, samples=start + samples, start=start, seed=self.seed, draws=draws, block=block
         ):
             observed.append(arrays)
             self.statuses += np.bincount(arrays[-1], minlength=len(self.statuses))
-            if self._progress:
-                self._progress(min(self.simulated, self.total), self.total)
-            if self._answers:
-                self._answers.check(self.total)
+            if self.progress:
+                self.progress(min(self.simulated, self.total), self.total)
+            self._look()
         return tuple(np.concatenate(column) for column in zip(*observed, strict=True))
 
     def simulate_deviations(self, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -86,41 +175,23 @@ class Engine:
         return measured, status
 
     def simulate_design(
-        self, design: Design, samples: int, *, seed: int, start: int = 0, observe: Observer = outcomes
+        self, design: Design, samples: int, *, start: int = 0, observe: Observer = outcomes
     ) -> tuple[np.ndarray, ...]:
         """Return the results of `observe` for `samples` base realizations of a design, as arrays (base, realization, ...).
 
         The first base realization has the number `start`.
         """
-        arrays = self.simulate(samples * design.size, seed=seed, start=start * design.size, draws=design, observe=observe)
+        arrays = self.simulate(samples * design.size, start=start * design.size, draws=design, observe=observe)
         return tuple(array.reshape(samples, len(array) // samples, *array.shape[1:]) for array in arrays)
 
-
-class Analysis:
-    """A question about one model, and its answer: a dataset that can be stored in an archive.
-
-    All options are checked before anything is simulated; without `samples` nothing is. Raises ModelError, ArchiveError,
-    OptionError for invalid arguments.
-    """
-
-    def __init__(
-        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int | None = None, seed: int = 1,
-        solver: Solver | None = None, method: Choice | None = None, into: str | Path | None = None, client: Any = None,
-        progress: Progress | None = None, minutes: float | None = None,
-    ) -> None:  # fmt: skip
-        self._answers = Answers(record, self._dataset, minutes)
-        if samples is not None:
-            check_counts(samples=samples, seed=seed)
-        self.record, self.program, self._into = record, program_of(model, solver, method), into
-        self.samples, self.seed, self.progress = samples or 0, seed, progress
-        self.blocks, self._client = mapping(client), client
-        if into is not None:
-            check_room_for(into, record, self.program)
-
-    @property
-    def assembly(self) -> str:
-        """The name of the assembly."""
-        return self.program.nominal.assembly.name
+    def stages(
+        self, design: Design, samples: int, *, start: int = 0, observe: Observer = outcomes
+    ) -> Iterator[tuple[int, list[np.ndarray]]]:
+        """Simulate a design in stages; yield the number of base realizations so far, and the results of all of them."""
+        observed: list[tuple[np.ndarray, ...]] = []
+        for first, stop in stages(samples, design.size):
+            observed.append(self.simulate_design(design, stop - first, start=start + first, observe=observe))
+            yield stop, [np.concatenate(parts) for parts in zip(*observed, strict=True)]
 
     def dataset(
         self, values: Mapping[str, Any], labels: Mapping[str, Sequence[str]], *, units: str | None = None, **attributes: Any
@@ -131,14 +202,38 @@ class Analysis:
     def finest(self, answers: Iterable[Callable[[], Answer]]) -> xr.Dataset:
         """Return the dataset of the last of some answers, which are more and more accurate, and add it to the archive.
 
-        Answers are functions, since most of them are never asked for. When the time of the analysis ends, the dataset is that
-        of the latest answer. Raises Stopped, with this dataset, when the user stops the analysis.
+        When the time of the analysis ends, the dataset is that of the latest answer. Raises Stopped, with this dataset, when
+        the user stops the analysis.
         """
         try:
-            return self._kept(self._answers.last(answers))
-        except Stopped as stop:
-            self._kept(stop.dataset)
-            raise
+            for answer in answers:
+                self._latest = answer
+            assert self._latest is not None
+            dataset = self._dataset(self._latest()._replace(coarse=""))
+        except OutOfTime:
+            dataset = self._coarse(f"{self._minutes:g} minutes have passed")
+        except BaseException as error:
+            if self._latest is None or not (isinstance(error, KeyboardInterrupt) or interrupts.is_stopping()):
+                raise
+            raise Stopped(self._kept(self._coarse("stopped"))) from None
+        return self._kept(dataset)
+
+    def _look(self) -> None:
+        """Show the latest answer now and then if there are many realizations; raise OutOfTime when time is up."""
+        if self._latest is None:
+            return
+        seconds = time.monotonic() - self._started
+        if self._minutes is not None and seconds > 60 * self._minutes:
+            raise OutOfTime
+        if self.total > LONG and seconds >= self._next_look:
+            for line in brief_lines(self.record, self._coarse("so far")):
+                log.warning(line)
+            self._next_look = max(NEXT_LOOK * (time.monotonic() - self._started), MIN_LOOK)
+
+    def _coarse(self, reason: str) -> xr.Dataset:
+        assert self._latest is not None
+        answer = self._latest()
+        return self._dataset(answer).assign_attrs({terms.COARSE: f"{reason}: {answer.coarse}"})
 
     def _kept(self, dataset: xr.Dataset) -> xr.Dataset:
         if self._into is not None:
@@ -146,19 +241,18 @@ class Analysis:
         return dataset
 
     def _dataset(self, answer: Answer) -> xr.Dataset:
-        values, labels, attributes, units = answer.values, answer.labels, dict(answer.attributes), answer.units
+        values, attributes, method = answer.values, dict(answer.attributes), self.program.method
         stated = [*self.record.variables, *(v for v in self.record.of_stations if v.name in values)]
-        arrays = {v.name: v.entry(np.array(values[v.name])) for v in stated}
-        title = {"title": self.record.title.format(assembly=self.assembly, **attributes)}
-        method = self.program.method
         settings = {
             "seed": self.seed, "solver": self.program.solver.name, "resolution": method.resolution,
             "objective": method.objective,
         }  # fmt: skip
         return xr.Dataset(
-            arrays,
-            coords=self._coordinates(labels) | ({} if units is None else {"measure_units": ((), units)}),
-            attrs=title | attributes | (settings if self.samples else {}),
+            {v.name: v.entry(np.array(values[v.name])) for v in stated},
+            coords=self._coordinates(answer.labels) | ({} if answer.units is None else {"measure_units": ((), answer.units)}),
+            attrs={"title": self.record.title.format(assembly=self.assembly, **attributes)}
+            | attributes
+            | (settings if self.samples else {}),
         )
 
     def _coordinates(self, labels: Mapping[str, Sequence[str]]) -> dict[str, Any]:
@@ -181,19 +275,6 @@ class Analysis:
                 coordinates[f"{dim}_units"] = (dim, [units[dim][label] for label in coordinates[dim]])
         return coordinates
 
-    def engine(self, total: int | None = None) -> Engine:
-        """Return an engine that reports its progress if there is a `total` of realizations.
-
-        Raises OptionError if that many realizations would take too much time or memory.
-        """
-        self.check_affordable(self.samples if total is None else total)
-        progress = None if total is None else self.progress
-        return Engine(self.program, self.blocks, progress=progress, total=total or 0, answers=self._answers)
-
-    def check_affordable(self, realizations: int) -> None:
-        """Raise OptionError if that many realizations would take too much time or memory."""
-        check_affordable(self.program, samples=realizations, seed=self.seed, threads=threads_of(self._client))
-
     def sampled_deviations(self) -> np.ndarray:
         """Return deviations (n, contributor) of enough realizations for estimates of spreads."""
         return self.program.draws(seed=self.seed, start=0, stop=SPREAD_SAMPLES)
@@ -210,6 +291,18 @@ class Analysis:
         """Raise OptionError if nothing varies."""
         if not varies:
             raise OptionError(f'nothing varies in "{self.assembly}"; give it tolerances first')
+
+
+def stages(samples: int, size: int, *, first: int = 0) -> Iterator[tuple[int, int]]:
+    """Yield first and last numbers of the base realizations of stages, each with as many as all before.
+
+    size   realizations of each base realization
+    first  base realizations of the first stage, if not the default
+    """
+    start, stop = 0, min(first or max(MIN_STAGE // size, MIN_BASE), samples)
+    while start < samples:
+        yield start, stop
+        start, stop = stop, min(2 * stop, samples)
 
 
 def owners(program: Program, by: str) -> list[str]:

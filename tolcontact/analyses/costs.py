@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy
@@ -18,28 +18,33 @@ Cost = float | Callable[[float], float] | Mapping[float | str, float]
 
 
 @dataclass(frozen=True, eq=False)
-class CostTable:
-    """The ranges to choose from; between them, where only a search comes, the cost is linear in the logarithm.
+class Curve:
+    """The cost of a range by the factor of its width; with a table it is linear in the logarithm between two choices.
 
-    names   as declared: the full width, or the grade
-    logs    (choice,): logarithms of the ranges over the present one, ascending
-    costs   (choice,): a wider choice costs less
+    names  the choices of a table as declared: the full width, or the grade; none without a table
+    logs   (choice,): logarithms of their ranges over the present one, ascending; a wider choice costs less
     """
 
-    names: tuple[str, ...]
-    logs: np.ndarray
-    costs: np.ndarray
+    cost: Callable[[float], float]
+    names: tuple[str, ...] = ()
+    logs: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __call__(self, factor: float) -> float:
         """Return the cost at a factor of the range."""
-        return float(np.interp(math.log(factor), self.logs, self.costs))
+        return float(self.cost(factor))
+
+    @property
+    def ends(self) -> np.ndarray:
+        """The least and the largest logarithm of the factor."""
+        return self.logs[[0, -1]] if self.names else np.log([MIN_FACTOR, MAX_FACTOR])
 
     def nearest(self, log: float) -> int:
         """Return the index of the widest choice that is not wider, or of the narrowest."""
         return max(int(np.searchsorted(self.logs, log + 1e-9, side="right")) - 1, 0)
 
-
-Curve = float | Callable[[float], float]
+    def narrowed(self, log: float) -> float:
+        """Return the logarithm of the next narrower choice; without a table, the same."""
+        return float(self.logs[self.nearest(log)]) if self.names else log
 
 
 def curves_of(
@@ -47,7 +52,7 @@ def curves_of(
 ) -> dict[str, Curve]:
     """Return the cost of each group that may change. Raises OptionError for costs that are none, and for unknown groups."""
     if costs is None:
-        return dict.fromkeys(groups, 1.0)
+        return dict.fromkeys(groups, constant(1.0))
     if not costs:
         raise OptionError("costs is empty; name the groups that may change, or leave it out")
     curves: dict[str, Curve] = {}
@@ -57,8 +62,10 @@ def curves_of(
             raise OptionError(f'costs has "{name}"; expected some of: {", ".join(groups)}')
         if isinstance(cost, Mapping):
             curves[name] = _table(name, cost, widths[name], _size(program, groups[name]))
-        elif callable(cost) or _is_cost(cost):
-            curves[name] = cost
+        elif callable(cost):
+            curves[name] = Curve(cost)
+        elif _is_cost(cost):
+            curves[name] = constant(cost)
         else:
             raise OptionError(
                 f'cost of "{name}" is {cost!r}; expected a number above 0, a function of the factor of its range, or a table '
@@ -67,51 +74,27 @@ def curves_of(
     return curves
 
 
-def cost_of(curve: Curve, factor: float) -> float:
-    """Return the cost of a range times a factor."""
-    return float(curve(factor)) if callable(curve) else float(curve / factor)
+def constant(cost: float) -> Curve:
+    """Return the cost c over the factor."""
+    return Curve(lambda factor: cost / factor)
 
 
-class Curves(tuple[Curve, ...]):
-    """The costs of all groups, and the factors that they may have."""
-
-    __slots__ = ()
-
-    @property
-    def has_table(self) -> np.ndarray:
-        """Whether the range of a group is one of a table, (group,)."""
-        return np.array([isinstance(curve, CostTable) for curve in self])
-
-    @property
-    def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """The least and the largest logarithm of the factor of each group, (group,)."""
-        usual = np.log([MIN_FACTOR, MAX_FACTOR])
-        lower, upper = np.array([curve.logs[[0, -1]] if isinstance(curve, CostTable) else usual for curve in self]).T
-        return lower, upper
-
-    def narrowed(self, logs: np.ndarray) -> np.ndarray:
-        """Return logarithms (group,) with the next narrower choices of tables."""
-        pairs = zip(self, logs, strict=True)
-        return np.array([curve.logs[curve.nearest(log)] if isinstance(curve, CostTable) else log for curve, log in pairs])
-
-    def names(self, logs: np.ndarray, groups: Sequence[str]) -> str:
-        """Return the groups that have a table, with the names of their choices."""
-        rows = zip(groups, self, logs, strict=True)
-        return ", ".join(f"{name}: {x.names[x.nearest(log)]}" for name, x, log in rows if isinstance(x, CostTable))
-
-
-def cheapest(curves: Curves, logs: np.ndarray, free: np.ndarray, margins: np.ndarray, slopes: np.ndarray) -> np.ndarray | None:
+def cheapest(
+    curves: Sequence[Curve], logs: np.ndarray, free: np.ndarray, margins: np.ndarray, slopes: np.ndarray
+) -> np.ndarray | None:
     """Return the logarithms (group,) of the choices of least cost, or None if no choice has sufficient margins.
 
     Margins (requirement,) at `logs` change by their slopes (requirement, group) times half the relative change of the squared
     range: a linear program with a binary unknown for each choice. Free ranges without a table have a grid of factors.
     """
+    grid = np.log(np.geomspace(MIN_FACTOR, MAX_FACTOR, GRID))
     options = [
-        _options(curve, log) if is_free else np.array([log]) for curve, log, is_free in zip(curves, logs, free, strict=True)
+        (curve.logs if curve.names else np.append(grid, log)) if is_free else np.array([log])
+        for curve, log, is_free in zip(curves, logs, free, strict=True)
     ]
     group = np.repeat(np.arange(len(logs)), [len(choices) for choices in options])
     choices = np.concatenate(options)
-    prices = [cost_of(curves[k], math.exp(choice)) for k, choice in zip(group, choices, strict=True)]
+    prices = [curves[int(k)](math.exp(choice)) for k, choice in zip(group, choices, strict=True)]
     gains = slopes[:, group] * (np.exp(2 * (choices - logs[group])) - 1) / 2
     one_each = scipy.sparse.csr_array((np.ones(len(group)), (group, np.arange(len(group)))))
     solution = scipy.optimize.milp(
@@ -125,11 +108,7 @@ def cheapest(curves: Curves, logs: np.ndarray, free: np.ndarray, margins: np.nda
     )
 
 
-def _options(curve: Curve, log: float) -> np.ndarray:
-    return curve.logs if isinstance(curve, CostTable) else np.append(np.log(np.geomspace(MIN_FACTOR, MAX_FACTOR, GRID)), log)
-
-
-def _table(name: str, costs: Mapping[float | str, float], present: float, size: float | None) -> CostTable:
+def _table(name: str, costs: Mapping[float | str, float], present: float, size: float | None) -> Curve:
     if not math.isfinite(present):
         raise OptionError(f'cost of "{name}" is a table, but its zones have several widths; use by="contributor"')
     if not costs or not all(map(_is_cost, costs.values())):
@@ -138,7 +117,8 @@ def _table(name: str, costs: Mapping[float | str, float], present: float, size: 
     # A choice that is no cheaper than a narrower one is of no use.
     rows = [row for k, row in enumerate(rows) if all(row[1] < narrower[1] for narrower in rows[:k])]
     widths, prices, names = zip(*rows, strict=True)
-    return CostTable(names, np.log(np.array(widths) / present), np.array(prices))
+    logs = np.log(np.array(widths) / present)
+    return Curve(lambda factor: np.interp(math.log(factor), logs, prices), names, logs)
 
 
 def _width(name: str, key: float | str, size: float | None) -> float:

@@ -1,6 +1,6 @@
 """The position of a locator, within a box, that minimizes the variation of a measure, with contact."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,14 +9,14 @@ import scipy
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Engine, Progress
+from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress
 from tolcontact.compilation import Program, compile_program
-from tolcontact.declaration import Assembly, Locator, ThreeTwoOne
+from tolcontact.declaration import Locator, ThreeTwoOne
 from tolcontact.discretization import Nominal, NominalPart, discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.limits import Limits
 from tolcontact.method import Solver
-from tolcontact.statistics import intervals, two_samples
+from tolcontact.statistics import intervals
 from tolcontact.statistics.capability import share_outside
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import StatisticRequest
@@ -61,79 +61,68 @@ def relocate(
         terms.RELOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress,
     )  # fmt: skip
-    analysis.check_affordable(VERIFICATION_FACTOR * samples)
-    goal = Goal.parse(least, analysis.program)
-    trials = TrialPositions(analysis, locator, goal, *_corners(between))
-    trials.try_grid()
-    if not np.isfinite(trials.values).any():
-        lower, upper = trials.lower.tolist(), trials.upper.tolist()
-        raise OptionError(f'"{locator}" cannot stand anywhere between {lower} and {upper}; choose other corners')
-    trials.attempt(trials.point)
+    analysis.expect(VERIFICATION_FACTOR * samples)
+    measure, limits, units = _goal(least, analysis.program)
+    trials = TrialPositions(analysis, locator, measure, limits, _corners(between))
     trials.search()
-    best = trials.points[int(np.nanargmin(trials.values))]
+    best = trials.best
     (before, lost_before), (after, lost_after) = (trials.measured(point, fresh=True) for point in (trials.point, best))
-    if not goal.estimate(after).value < goal.estimate(before).value:
+    if not _estimate(after, limits).value < _estimate(before, limits).value:
         best, after, lost_after = trials.point, before, lost_before
     values = {
         "point": [trials.point, best],
-        "reached": [goal.estimate(before), goal.estimate(after)],
-        "change": goal.change(before, after),
+        "reached": [_estimate(before, limits), _estimate(after, limits)],
+        "change": _change(before, after, limits),
         "unresolved": [lost_before, lost_after],
         "tried": trials.points,
         "tried_value": trials.values,
     }
     attributes = {"locator": locator, "least": least, "samples": samples, "fresh": VERIFICATION_FACTOR * samples}
-    return analysis.dataset(values, {}, units=goal.units, **attributes)
+    return analysis.dataset(values, {}, units=units, **attributes)
 
 
-@dataclass(frozen=True)
-class Goal:
-    """The statistic to minimize: 6 sigma of a corrected measure, or the share outside its limits.
+def _goal(least: str, program: Program) -> tuple[int, Limits | None, str]:
+    """Return the index of the measure, its limits if the share outside is to be least, and the units of the statistic.
 
-    measure  index of the measure
-    units    of the statistic
+    Raises OptionError for texts that are not like "corner height: 6 sigma" or "gap: ppm".
     """
+    request = StatisticRequest.parse(least, "least", statistics=(SIX_SIGMA, terms.PPM), examples=EXAMPLES)
+    measures = program.nominal.measures
+    measure = request.number_of([measure.name for measure in measures])
+    if request.statistic == SIX_SIGMA:
+        return measure, None, measures[measure].units
+    limits = program.limits(measure)
+    if limits.are_open:
+        raise OptionError(f"least is {least!r}, and the measurement has no limits; give it tolerance=... or limits=...")
+    return measure, limits, "1"
 
-    measure: int
-    is_spread: bool
-    limits: Limits
-    units: str
 
-    @classmethod
-    def parse(cls, text: str, program: Program) -> "Goal":
-        """Return the goal of a text such as "corner height: 6 sigma" or "gap: ppm". Raises OptionError for others."""
-        request = StatisticRequest.parse(text, "least", statistics=(SIX_SIGMA, terms.PPM), examples=EXAMPLES)
-        measures, is_spread = program.nominal.measures, request.statistic == SIX_SIGMA
-        number = request.number_of([measure.name for measure in measures])
-        limits = program.limits(number)
-        if not is_spread and limits.are_open:
-            raise OptionError(f"least is {text!r}, and the measurement has no limits; give it tolerance=... or limits=...")
-        return cls(number, is_spread, limits, measures[number].units if is_spread else "1")
+def _estimate(x: np.ndarray, limits: Limits | None) -> Estimate:
+    """Return the share of values (n,) outside limits, or 6 sigma without limits, with its interval."""
+    return intervals.standard_deviation(x, times=6) if limits is None else share_outside(Sample.of(x), limits)
 
-    def estimate(self, x: np.ndarray) -> Estimate:
-        """Return 6 sigma, or the share outside, of values (n,), with its interval."""
-        sample = Sample.of(x)
-        return intervals.standard_deviation(sample, times=6) if self.is_spread else share_outside(sample, self.limits)
 
-    def change(self, before: np.ndarray, after: np.ndarray) -> Estimate:
-        """Return the change from values (n,) to values of the same draws: a ratio of 6 sigma, or a difference of shares."""
-        if after is before:
-            return Estimate(*[float(self.is_spread)] * 3)
-        if self.is_spread:
-            return Estimate(*np.sqrt(two_samples.variance_ratio(Sample.of(after), Sample.of(before), paired=True)))
-        hits = [Sample.of(self.limits.outside(x)) for x in (after, before)]
-        return two_samples.share_shift(*hits, paired=True)
+def _change(before: np.ndarray, after: np.ndarray, limits: Limits | None) -> Estimate:
+    """Return the change from values (n,) to values of the same draws: a ratio of 6 sigma, or a difference of shares."""
+    if after is before:
+        return Estimate(*[float(limits is None)] * 3)
+    if limits is None:
+        return Estimate(*np.sqrt(intervals.variance_ratio(after, before)))
+    hits = [Sample.of(limits.outside(x)) for x in (after, before)]
+    return intervals.share_shift(*hits, paired=True)
 
 
 class TrialPositions:
     """Simulations of the assembly with a locator at trial positions in a box, on the same draws.
 
-    lower, upper    (3,) corners of the box [mm]
     points, values  of all trials: positions (3,) [mm], and the values of the goal
     """
 
-    def __init__(self, analysis: Analysis, locator: str, goal: Goal, lower: np.ndarray, upper: np.ndarray) -> None:
-        self._analysis, self._goal, self.lower, self.upper = analysis, goal, lower, upper
+    def __init__(
+        self, analysis: Analysis, locator: str, measure: int, limits: Limits | None, box: tuple[np.ndarray, np.ndarray]
+    ) -> None:  # fmt: skip
+        self._analysis, self._locator, self._measure, self._limits = analysis, locator, measure, limits
+        self._lower, self._upper = lower, upper = box
         self._sides = np.flatnonzero(upper > lower)
         self._count = GRID_POINTS[len(self._sides)]
         self.points: list[np.ndarray] = []
@@ -142,7 +131,7 @@ class TrialPositions:
         if locator not in nominal.locators.labels:
             raise OptionError(f'there is no locator "{locator}"; expected one of: {", ".join(nominal.locators.labels)}')
         self._part = next(part for part in nominal.parts if locator in part.locators.labels)
-        self._scheme = declared_locators(nominal, self._part)
+        self._scheme = _declared_locators(nominal, self._part)
         self._number = self._part.locators.labels.index(locator)
         owner = nominal.parts[self._part.owners[self._number]] if self._part.owners else self._part
         if owner.part.elasticity and owner.part.elasticity.stiffness:
@@ -156,6 +145,11 @@ class TrialPositions:
         """The declared position of the locator, (3,) [mm]."""
         return np.array(self._scheme[self._number].point)
 
+    @property
+    def best(self) -> np.ndarray:
+        """The best position so far, (3,) [mm]."""
+        return self.points[int(np.nanargmin(self.values))]
+
     def measured(self, point: np.ndarray, *, fresh: bool = False) -> tuple[np.ndarray, int]:
         """Return the corrected measure (n,) with the locator at a point (3,) [mm], and the number of unresolved realizations.
 
@@ -164,48 +158,45 @@ class TrialPositions:
         analysis, scheme = self._analysis, list(self._scheme)
         scheme[self._number] = replace(scheme[self._number], point=(point[0], point[1], point[2]))
         solver, method = analysis.program.solver.name, analysis.program.method
-        nominal = discretize(self._with_locators(tuple(scheme)), presses=method.minimizes.presses)
-        program = compile_program(nominal, solver, method)
-        engine = Engine(program, analysis.blocks)
+        part, station, assembly = self._part.part, self._part.station, analysis.program.nominal.assembly
+        locations = [
+            replace(x, scheme=tuple(scheme)) if x.part is part and x.station == station else x for x in assembly.locations
+        ]
+        nominal = discretize(assembly.replaced(locations=locations), presses=method.minimizes.presses)
         start = VERIFICATION_FACTOR * analysis.samples if fresh else 0
-        measured, _ = engine.simulate(start or analysis.samples, start=start, seed=analysis.seed)
-        return measured[:, terms.CORRECTED, self._goal.measure].copy(), engine.unresolved
-
-    def _with_locators(self, scheme: tuple[Locator, ...]) -> Assembly:
-        """Return the assembly with other locators of the part."""
-        assembly, part, station = self._analysis.program.nominal.assembly, self._part.part, self._part.station
-        return assembly.replaced(
-            locations=[replace(x, scheme=scheme) if x.part is part and x.station == station else x for x in assembly.locations]
+        measured, status = analysis.of(compile_program(nominal, solver, method)).simulate(
+            start or analysis.samples, start=start
         )
-
-    def try_grid(self) -> None:
-        """Try a grid of positions."""
-        axes = [np.linspace(0, 1, self._count)] * len(self._sides)
-        for shares in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(self._sides)):
-            self.attempt(self._at(shares))
+        return measured[:, terms.CORRECTED, self._measure].copy(), int(np.isin(status, terms.UNRESOLVED).sum())
 
     def search(self) -> None:
-        """Try further positions, starting at the best one."""
-        sides, best = self._sides, self.points[int(np.nanargmin(self.values))]
-        start = ((best - self.lower)[sides] / (self.upper - self.lower)[sides]).clip(0.0, 1.0)
+        """Try a grid of positions and the declared one, and then further ones, starting at the best one."""
+        sides, axes = self._sides, [np.linspace(0, 1, self._count)] * len(self._sides)
+        for shares in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(sides)):
+            self._attempt(self._at(shares))
+        if not np.isfinite(self.values).any():
+            lower, upper = self._lower.tolist(), self._upper.tolist()
+            raise OptionError(f'"{self._locator}" cannot stand anywhere between {lower} and {upper}; choose other corners')
+        self._attempt(self.point)
+        start = ((self.best - self._lower)[sides] / (self._upper - self._lower)[sides]).clip(0.0, 1.0)
         ceiling = 1e3 * max(value for value in self.values if np.isfinite(value))  # COBYQA does not accept infinity
         scipy.optimize.minimize(
-            lambda shares: min(self.attempt(self._at(shares)), ceiling),
+            lambda shares: min(self._attempt(self._at(shares)), ceiling),
             start, method="COBYQA", bounds=scipy.optimize.Bounds(np.zeros(len(start)), np.ones(len(start))),
             options={"maxfev": MAX_TRIALS, "initial_tr_radius": 0.5 / self._count, "final_tr_radius": POSITION_TOLERANCE},
         )  # fmt: skip
 
     def _at(self, shares: np.ndarray) -> np.ndarray:
         """Return the position (3,) [mm] at shares (side,) of the sides."""
-        point = self.lower.copy()
-        point[self._sides] += shares * (self.upper - self.lower)[self._sides]
+        point = self._lower.copy()
+        point[self._sides] += shares * (self._upper - self._lower)[self._sides]
         return point
 
-    def attempt(self, point: np.ndarray) -> float:
+    def _attempt(self, point: np.ndarray) -> float:
         """Return the value of the goal at a position (3,) [mm], also outside the box; infinite if there is no model."""
         try:
             measured, _ = self.measured(point)
-            value = self._goal.estimate(measured).value
+            value = _estimate(measured, self._limits).value
         except ModelError:
             value = np.inf
         self.points.append(point)
@@ -215,7 +206,7 @@ class TrialPositions:
         return value
 
 
-def declared_locators(nominal: Nominal, part: NominalPart) -> tuple[Locator, ...]:
+def _declared_locators(nominal: Nominal, part: NominalPart) -> tuple[Locator, ...]:
     """Return the locators of a part in its own frame, or of a joint in the frames of its parts, as in a script."""
     if not isinstance(part.scheme, ThreeTwoOne):
         return part.scheme or ()

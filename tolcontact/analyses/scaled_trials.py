@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Engine
+from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, stages
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
@@ -34,7 +34,6 @@ SPREAD = 4.0  # of the shares whose quantiles are averaged for slopes: a single 
 MIN_HITS = 10  # realizations outside the limits needed to estimate a share
 EXAMPLES = ("corner height: ppm 1000", "gap: Ppk 1.33")
 STEP = 0.1  # of ranges, for differences
-FIRST_TRIALS = 64  # realizations that show whether most are unresolved
 MAX_ROWS = 1 << 16  # realizations per simulation, over several factors
 NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes count as 0
 FIRST_BLOCK = 64  # realizations; each further block has as many as all previous ones
@@ -76,68 +75,58 @@ class Requirement:
         """The permitted share of values beyond the limits; for a Ppk, the share beyond its percentiles."""
         return self.value if self.is_share else TAIL
 
-    def check(self, samples: int) -> None:
-        """Raise OptionError if `samples` are too few to estimate the share or the Ppk."""
-        minimum = int(np.ceil(MIN_HITS / self.share * (1 - ROUNDING)))
-        if samples < minimum:
-            raise OptionError(f'{samples} realizations are too few for "{self.name}"; expected samples={minimum} or more')
-
-    def margin(self, x: np.ndarray) -> float:
-        """Return the margin of values (n,) above the requirement, in the measure's units; negative if they do not meet it.
+    def margin(
+        self, corrected: np.ndarray, shares: float | np.ndarray | None = None, index: float | None = None
+    ) -> float:  # fmt: skip
+        """Return the margin of measures (n, measure) above the requirement, in the measure's units; negative if they miss it.
 
         For a share the margin is a quantile of the distances within the limits. It changes continuously with the values,
         while a count of values outside jumps. Limits that are stops need no margin (see without_stops).
+        `shares`, whose quantiles are averaged, and the `index` replace those of the requirement.
         """
-        return self._share_margin(x, self.value) if self.is_share else self._capability_margin(x, self.value)
+        x, shares = corrected[:, self.measure], self.share if shares is None else shares
+        limits = without_stops(Sample.of(x), self.limits)
+        if self.is_share:
+            return -float(np.quantile(limits.excess(x), 1 - shares).mean())
+        index = self.value if index is None else index
+        tail, middle, head = np.quantile(x, shares).mean(), np.median(x), np.quantile(x, 1 - shares).mean()
+        sides = limits.upper - middle - index * (head - middle), middle - limits.lower - index * (middle - tail)
+        return float(np.nanmin(sides))
 
-    def smooth_margin(self, x: np.ndarray) -> float:
+    def smooth_margin(self, corrected: np.ndarray) -> float:
         """Return the margin with the means of quantiles around the quantiles of `margin`, for slopes."""
         spread = min(SPREAD, self.share**-0.5)
-        shares = self.share * np.geomspace(1 / spread, spread, 16)
-        return self._share_margin(x, shares) if self.is_share else self._capability_margin(x, self.value, shares)
+        return self.margin(corrected, self.share * np.geomspace(1 / spread, spread, 16))
 
-    def sure_margin(self, x: np.ndarray) -> float:
-        """Return the margin of the 95 % interval of the share, or of the Ppk: 0 or more if it keeps the requirement.
-
-        x   (n,) values of a fresh run
-        """
+    def sure_margin(self, corrected: np.ndarray) -> float:
+        """Return the margin of the 95 % interval of the share or the Ppk: 0 or more if a fresh run keeps the requirement."""
         if self.is_share:
-            counts = range(len(x) + 1)
-            permitted = bisect.bisect_right(counts, self.value, key=lambda hits: proportion_of(hits, len(x)).upper) - 1
-            return self._share_margin(x, permitted / len(x)) if permitted >= 0 else -math.inf
-        value, lower, _ = self.estimate(x)
-        return self._capability_margin(x, self.value + value - lower) if lower > 0 else -math.inf
+            count = len(corrected)
+            hits = bisect.bisect_right(range(count + 1), self.value, key=lambda hits: proportion_of(hits, count).upper) - 1
+            return self.margin(corrected, hits / count) if hits >= 0 else -math.inf
+        value, lower, _ = self.estimate(corrected)
+        return self.margin(corrected, index=self.value + value - lower) if lower > 0 else -math.inf
 
-    def _share_margin(self, x: np.ndarray, shares: float | np.ndarray) -> float:
-        return -float(np.quantile(without_stops(Sample.of(x), self.limits).excess(x), 1 - shares).mean())
-
-    def _capability_margin(self, x: np.ndarray, index: float, shares: float | np.ndarray = TAIL) -> float:
-        lower, upper, _ = without_stops(Sample.of(x), self.limits)
-        tail, middle, head = np.quantile(x, shares).mean(), np.median(x), np.quantile(x, 1 - shares).mean()
-        return float(np.nanmin([upper - middle - index * (head - middle), middle - lower - index * (middle - tail)]))
-
-    def decisive(self, x: np.ndarray) -> np.ndarray:
-        """Return the indices of the values (n,) that determine the margin: values beyond it, and values near it.
+    def decisive(self, corrected: np.ndarray) -> np.ndarray:
+        """Return the indices of the realizations that determine the margin: values beyond it, and values near it.
 
         The median of a Ppk is treated as constant.
         """
+        x = corrected[:, self.measure]
         count = max(math.ceil(DECISIVE * self.share * len(x)), MIN_DECISIVE)
-        limits = without_stops(Sample.of(x), self.limits)
-        orders = [np.argsort(-limits.excess(x))] if self.is_share else [np.argsort(x), np.argsort(-x)]
-        return np.concatenate([order[:count] for order in orders])
+        keys = [-without_stops(Sample.of(x), self.limits).excess(x)] if self.is_share else [x, -x]
+        return np.concatenate([np.argsort(key)[:count] for key in keys])
 
-    def shortfall(self, x: np.ndarray) -> float:
-        """Return the shortfall of the bound of values (n,) as a share of the required value; 0 if it meets the requirement."""
-        _, lower, upper = self.estimate(x)
+    def shortfall(self, corrected: np.ndarray) -> float:
+        """Return the shortfall of the bound of an estimate as a share of the required value; 0 if it meets the requirement."""
+        _, lower, upper = self.estimate(corrected)
         missing = upper - self.value if self.is_share else self.value - lower
         return max(missing / self.value, 0.0) if np.isfinite(missing) else np.inf
 
-    def estimate(self, x: np.ndarray) -> Estimate:
-        """Return the share outside, or the Ppk, of values (n,), with its 95 % interval."""
-        sample = Sample.of(x)
-        if self.is_share:
-            return share_outside(sample, self.limits)
-        return by_percentiles(sample, self.limits)[1]
+    def estimate(self, corrected: np.ndarray) -> Estimate:
+        """Return the share outside, or the Ppk, with its 95 % interval."""
+        sample = Sample.of(corrected[:, self.measure])
+        return share_outside(sample, self.limits) if self.is_share else by_percentiles(sample, self.limits)[1]
 
 
 def requirements_of(require: str | Sequence[str], program: Program, samples: int) -> list[Requirement]:
@@ -146,7 +135,11 @@ def requirements_of(require: str | Sequence[str], program: Program, samples: int
     if not requirements:
         raise OptionError('require is empty; expected a text such as "corner height: ppm 1000"')
     for requirement in requirements:
-        requirement.check(samples)
+        minimum = int(np.ceil(MIN_HITS / requirement.share * (1 - ROUNDING)))
+        if samples < minimum:
+            raise OptionError(
+                f'{samples} realizations are too few for "{requirement.name}"; expected samples={minimum} or more'
+            )
     return requirements
 
 
@@ -173,61 +166,59 @@ class ScaledTrials:
     groups  columns of each group
     """
 
-    engine: Engine
+    analysis: Analysis
     groups: Sequence[np.ndarray]
     requirements: Sequence[Requirement]
-    seed: int
-    samples: int
     _known: dict[str, np.ndarray] = field(default_factory=dict, init=False)
 
     def trial(self, logs: np.ndarray, *, verification: int = 0) -> Trial:
         """Return the trial; a `verification` above 0 is the number of a run with other draws, and more of them."""
-        count = VERIFICATION_FACTOR * self.samples if verification else self.samples
-        measured, status = self.engine.simulate(count, start=verification << 32, seed=self.seed, draws=self._draws(logs))
-        return Trial(logs, np.ascontiguousarray(measured[:, terms.CORRECTED]), ~np.isin(status, terms.UNRESOLVED))
+        count = VERIFICATION_FACTOR * self.analysis.samples if verification else self.analysis.samples
+        return self._trial(logs, count, verification << 32)
 
     def trial_within(self, logs: np.ndarray, most_unresolved: int) -> Trial | None:
         """Return the trial, or None if too many realizations are unresolved.
 
         It stops once there are more than `most_unresolved`, since these take a hundred times as long as others.
         """
-        draws, corrected, resolved, start = self._draws(logs), [], [], 0
-        while start < self.samples:
-            stop = min(max(2 * start, FIRST_TRIALS), self.samples)
-            measured, status = self.engine.simulate(stop - start, start=start, seed=self.seed, draws=draws)
-            corrected.append(measured[:, terms.CORRECTED])
-            resolved.append(~np.isin(status, terms.UNRESOLVED))
-            if sum(int((~part).sum()) for part in resolved) > most_unresolved:
+        parts: list[Trial] = []
+        for start, stop in stages(self.analysis.samples, 1, first=FIRST_BLOCK):
+            parts.append(self._trial(logs, stop - start, start))
+            if sum(int((~part.is_resolved).sum()) for part in parts) > most_unresolved:
                 return None
-            start = stop
-        return Trial(logs, np.concatenate(corrected), np.concatenate(resolved))
+        _, corrected, is_resolved = zip(*parts, strict=True)
+        return Trial(logs, np.concatenate(corrected), np.concatenate(is_resolved))
+
+    def _trial(self, logs: np.ndarray, count: int, start: int) -> Trial:
+        measured, status = self.analysis.simulate(count, start=start, draws=self._draws(logs))
+        return Trial(logs, np.ascontiguousarray(measured[:, terms.CORRECTED]), ~np.isin(status, terms.UNRESOLVED))
 
     def corrected_rows(self, trials: Sequence[np.ndarray], rows: np.ndarray) -> list[np.ndarray]:
         """Return corrected measures (row, measure) of realizations by their numbers, for the `logs` of several trials."""
         if not len(rows):
-            return [np.empty((0, len(self.engine.program.nominal.measures)))] * len(trials)
+            return [np.empty((0, len(self.analysis.program.nominal.measures)))] * len(trials)
         corrected, at_once = [], max(MAX_ROWS // len(rows), 1)
         for start in range(0, len(trials), at_once):
             deviations = [
                 self._draws(logs).from_numbers(lambda label: self._numbers(label)[rows], len(rows))
                 for logs in trials[start : start + at_once]
             ]
-            measured, _ = self.engine.simulate_deviations(np.concatenate(deviations))
+            measured, _ = self.analysis.simulate_deviations(np.concatenate(deviations))
             corrected += np.split(measured[:, terms.CORRECTED], len(deviations))
         return corrected
 
     def _numbers(self, label: str) -> np.ndarray:
         """Return the random numbers (n,) between 0 and 1 for the deviations of a label, in all realizations."""
         if label not in self._known:
-            self._known[label] = self.engine.program.draws.numbers(seed=self.seed, start=0, stop=self.samples)(label)
+            draws = self.analysis.program.draws
+            self._known[label] = draws.numbers(seed=self.analysis.seed, start=0, stop=self.analysis.samples)(label)
         return self._known[label]
 
     def _draws(self, logs: np.ndarray) -> Draws:
-        program = self.engine.program
-        scale = np.ones(len(program.nominal.contributors))
+        scale = np.ones(len(self.analysis.program.nominal.contributors))
         for log, columns in zip(logs, self.groups, strict=True):
             scale[columns] = np.exp(log)
-        return program.draws.scaled(scale)
+        return self.analysis.program.draws.scaled(scale)
 
     def changes(self, before: Trial, sets: Iterable[Any], rows: np.ndarray, logs: np.ndarray) -> list[Hits]:
         """Return the rows, out of resolved `rows` (row,) of a trial, whose required measures change with other ranges.
@@ -259,16 +250,14 @@ class ScaledTrials:
 
     def _release(self, before: Trial, idle: np.ndarray, logs: np.ndarray) -> bool:
         """Mark idle groups (group,) that change a realization as not idle; return whether there are any."""
-        resolved_rows, number, start = np.flatnonzero(before.is_resolved), idle.sum(), 0
-        while start < len(resolved_rows) and idle.any():
-            stop = min(max(2 * start, FIRST_BLOCK), len(resolved_rows))
+        resolved_rows, number = np.flatnonzero(before.is_resolved), idle.sum()
+        for start, stop in stages(len(resolved_rows), 1, first=FIRST_BLOCK):
             rows = resolved_rows[start:stop]
             while idle.any() and len(rows := self.changes(before, [np.flatnonzero(idle)], rows, logs)[0][0]):
                 groups = np.flatnonzero(idle)
                 is_hit = [len(hits) > 0 for hits, _ in self.changes(before, groups, rows[:MAX_HITS], logs)]
                 # Groups that change realizations only jointly are all influential.
                 idle[groups[is_hit] if any(is_hit) else groups] = False
-            start = stop
         return bool(idle.sum() < number)
 
 
@@ -283,10 +272,10 @@ def narrowing_effects(trials: ScaledTrials) -> np.ndarray:
 
     Intervals come from means over batches of the same draws. A group that changes none of the first realizations has no effect.
     """
-    program = trials.engine.program
+    program = trials.analysis.program
     limits = [program.limits(number) for number in range(len(program.nominal.measures))]
     count = len(trials.groups)
-    rows = np.arange(effect_samples(trials.samples, count))
+    rows = np.arange(effect_samples(trials.analysis.samples, count))
     present, *narrowed_groups = trials.corrected_rows(list(np.log1p(-STEP * np.eye(1 + count, count, -1))), rows)
     effects = np.zeros((len(limits), len(terms.EFFECTS), count, len(terms.ESTIMATE)))
     for group, narrowed in enumerate(narrowed_groups):

@@ -89,22 +89,12 @@ def seated_contacts(program: Program) -> Touching | None:
         return None
     poses, pairs = block.poses[:, terms.CORRECTED], program.nominal.pairs
     _, relative = seated.observed(poses, deviations)
-    places = [
-        _in_assembly(_touching(seated, k, relative[:, k], deviations), poses[0, pair.reference or 0])
-        for k, pair in enumerate(pairs)
-        if not pair.is_supports
-    ]
+    places = []
+    for k, pair in enumerate(pairs):
+        if not pair.is_supports:
+            assert pair.moving_face is not None and pair.reference_face is not None
+            nearness = TOUCH_SHARE * max(pair.moving_face.mesh.scale, pair.reference_face.mesh.scale)
+            points, normals = pair_search(seated, k).touching(relative[:, k], deviations, nearness)  # in the reference's frame
+            X_WR = poses[0, pair.reference or 0]
+            places.append(TouchingPoints(pose.apply(X_WR, points), normals @ pose.rotation(X_WR).T))
     return contacts_at(program.nominal, poses[0], places)
-
-
-def _in_assembly(places: TouchingPoints, X_WR: np.ndarray) -> TouchingPoints:
-    """Return contact points in the frame of a reference part at X_WR (12,), transformed to the frame of the assembly."""
-    return TouchingPoints(pose.apply(X_WR, places.points), places.normals @ pose.rotation(X_WR).T)
-
-
-def _touching(program: Program, k: int, X_RM: np.ndarray, deviations: np.ndarray) -> TouchingPoints:
-    """Return the points at which pair k touches at X_RM (1, 12), in the frame of its reference part."""
-    pair = program.nominal.pairs[k]
-    assert pair.moving_face is not None and pair.reference_face is not None
-    nearness = TOUCH_SHARE * max(pair.moving_face.mesh.scale, pair.reference_face.mesh.scale)
-    return TouchingPoints(*pair_search(program, k).touching(X_RM, deviations, nearness))

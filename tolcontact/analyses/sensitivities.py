@@ -1,6 +1,6 @@
 """Derivatives of each measure with respect to each contributor, with contact."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,15 +9,14 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis, Progress
-from tolcontact.analyses.answers import Answer, stages
-from tolcontact.analyses.designs import SteppedDraws
+from tolcontact.analyses.analysis import Analysis, Answer, Design, Progress
 from tolcontact.analyses.linear_model import leverages, total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.method import Solver
 from tolcontact.simulation import Block
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
+from tolcontact.variation.draws import Draws
 from tolcontact.workflow.models import Choice, Model
 
 STEP = 0.01  # of a contributor's standard deviation
@@ -61,37 +60,51 @@ def sensitivities(
     return analysis.finest(_answers(analysis, columns, STEP * deviation[columns]))
 
 
+class SteppedDraws(Design):
+    """Each realization, followed by steps up, then down, of each of `columns` by `steps` (column,) in its units.
+
+    A step of a shared cause also steps the contributors that it drives.
+    """
+
+    def __init__(self, draws: Draws, columns: np.ndarray, steps: np.ndarray) -> None:
+        self._draws, self._columns, self._steps = draws, columns, steps
+        self._drive = draws.drive_matrix
+        self.size = 1 + 2 * len(columns)
+
+    def members(self, seed: int, start: int, stop: int) -> np.ndarray:
+        """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
+        members = np.repeat(self._draws(seed=seed, start=start, stop=stop)[:, None], self.size, axis=1)
+        count, width = len(self._columns), members.shape[2]
+        changes = self._steps[:, None] * (np.eye(width) + self._drive)[self._columns]
+        members[:, 1 : count + 1] += changes
+        members[:, count + 1 :] -= changes
+        for k in np.flatnonzero(self._drive[self._columns].any(axis=1)):  # a datum depends on the tilts that a cause drives
+            self._draws.add_shifts(members[:, 1 + k])
+            self._draws.add_shifts(members[:, 1 + count + k])
+        return members
+
+
 def _answers(analysis: Analysis, columns: np.ndarray, steps: np.ndarray) -> Iterator[Callable[[], Answer]]:
     """Yield answers from more and more realizations; the first one has nominal derivatives only."""
-    stepped, samples = SteppedDraws(analysis.program.draws, columns, steps), analysis.samples
-    engine = analysis.engine(samples * stepped.size)
-    nominal = total_derivatives(analysis.program)[:, columns]
-    observed: list[tuple[np.ndarray, ...]] = []
+    program, samples = analysis.program, analysis.samples
+    stepped, nominal = SteppedDraws(program.draws, columns, steps), total_derivatives(program)[:, columns]
+    analysis.expect(samples * stepped.size)
+    unknown = np.full((len(nominal), 2, len(columns), len(terms.ESTIMATE)), np.nan)
+    unknown_values = {
+        "sensitivity": unknown, "spread": unknown[..., 0], "by_contact": unknown, "changing": unknown[0, 0],
+        "by_status": np.zeros(len(terms.STATUS_MEANINGS), dtype=int),
+    }  # fmt: skip
 
-    def answer(count: int) -> Answer:
-        arrays = [np.concatenate(parts) for parts in zip(*observed, strict=True)]
-        values = _values(analysis.program, steps, nominal, *arrays) if count else _nominal_values(analysis.program, nominal)
-        leverage = leverages(analysis.program)[columns]
-        labels = {terms.CONTRIBUTOR: [analysis.program.nominal.contributors[column] for column in columns]}
-        attributes = {"realizations": count, "simulated": count * stepped.size}
+    def answer(count: int, arrays: Sequence[np.ndarray] = ()) -> Answer:
+        values = _values(program, steps, nominal, *arrays) if count else unknown_values
+        values = {"nominal": nominal, "leverage": leverages(program)[columns], "step": steps, **values}
+        labels = {terms.CONTRIBUTOR: [program.nominal.contributors[column] for column in columns]}
         coarse = f"{count} of {samples} realizations" if count else "nominal derivatives, without contact"
-        return Answer({"leverage": leverage, "step": steps, **values}, labels, attributes, coarse)
+        return Answer(values, labels, {"realizations": count, "simulated": count * stepped.size}, coarse)
 
     yield partial(answer, 0)
-    for start, stop in stages(samples, stepped.size):
-        observed.append(engine.simulate_design(stepped, stop - start, start=start, seed=analysis.seed, observe=_observed))
-        yield partial(answer, stop)
-
-
-def _nominal_values(program: Program, nominal: np.ndarray) -> dict[str, Any]:
-    """Return the variables of derivatives with contact, which are not known yet."""
-    shape = *nominal.shape, len(terms.ESTIMATE)
-    unknown = np.full((len(nominal), 2, *shape[1:]), np.nan)
-    counts = np.zeros(len(terms.STATUS_MEANINGS), dtype=int)
-    return {
-        "nominal": nominal, "sensitivity": unknown, "spread": unknown[..., 0], "by_contact": unknown,
-        "changing": unknown[0, 0], "by_status": counts,
-    }  # fmt: skip
+    for count, arrays in analysis.stages(stepped, samples, observe=_observed):
+        yield partial(answer, count, arrays)
 
 
 def _values(
@@ -109,7 +122,6 @@ def _values(
     smooth = np.where(changes[:, :, None], np.nan, slopes[:, :, terms.CORRECTED])
     is_touched = status != terms.Status.UNTOUCHED
     return {
-        "nominal": nominal,
         "sensitivity": np.stack([_means(slopes[:, :, state]) for state in range(len(terms.STATES))], axis=1),
         "spread": slopes.std(axis=0, ddof=1).transpose(2, 1, 0),
         "by_contact": np.stack([_means(smooth[~is_touched]), _means(smooth[is_touched])], axis=1),

@@ -58,11 +58,11 @@ def stack_up(
         terms.STACK_UP, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress,
     )  # fmt: skip
-    engine = analysis.engine(samples)
+    analysis.expect(samples)
     linear, region = linear_model(analysis.program), AllowedRegion(analysis.program.draws, seed=seed)
     slopes = np.where(linear.kinked[0][:, None], np.nan, region.slopes(linear.by_deviations))
     rows = [_linear_range(analysis.program, region, row) for row in slopes]
-    measured, _ = engine.simulate(samples, seed=seed)
+    measured, _ = analysis.simulate(samples)
     values = {
         "drawn": linear.measures,
         "centred": linear.measures + [row[0] for row in rows],
@@ -71,7 +71,7 @@ def stack_up(
         "simulated": [[_ends(measured[:, k, m]) for k in range(len(terms.STATES))] for m in range(len(rows))],
         "links": [row[2] for row in rows],
         "forms": [row[3] for row in rows],
-        "by_status": engine.statuses,
+        "by_status": analysis.statuses,
     }
     return analysis.dataset(values, {}, realizations=samples)
 

@@ -63,15 +63,13 @@ def sweep(
         if not text.startswith(OF_ALL_POSITIONS):
             warnings.warn(text, doubt.category, stacklevel=2)
     _check_same(analyses, points)
-    measured, statuses, counts = [], [], []
+    simulated = []
     for number, analysis in enumerate(analyses):
         if progress is not None:
             analysis.progress = partial(_shifted, progress, number * samples, len(points) * samples)
-        engine = analysis.engine(samples)
-        of_measures, status = engine.simulate(samples, seed=seed)
-        measured.append(of_measures)
-        statuses.append(status)
-        counts.append(engine.statuses)
+        analysis.expect(samples)
+        simulated.append(analysis.simulate(samples))
+    measured, statuses = zip(*simulated, strict=True)
     swept = np.array(measured)  # (position, realization, state, measure)
     fails = np.zeros(swept.shape[:3], dtype=bool)
     fails[:, :, terms.CORRECTED] = np.array(statuses) == terms.Status.NOT_ASSEMBLABLE
@@ -84,7 +82,7 @@ def sweep(
     values |= {
         "swept": list(swept),
         "parameter": [[point[name] for point in points] for name in over],
-        "by_status": counts,
+        "by_status": [analysis.statuses for analysis in analyses],
     }
     return analyses[0].dataset(values, {terms.PARAMETER_NAME: list(over)}, realizations=samples, positions=len(points))
 

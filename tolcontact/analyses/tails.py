@@ -1,7 +1,6 @@
 """Probabilities of rare events: a measure outside its limits, or parts that cannot be assembled."""
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +9,14 @@ import xarray as xr
 from scipy.special import gammaincc, ndtr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis, Engine, Progress
-from tolcontact.analyses.answers import Answer, stages
+from tolcontact.analyses.analysis import Analysis, Answer, Progress, stages
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.method import Solver
 from tolcontact.statistics.intervals import UNDEFINED, proportion
-from tolcontact.statistics.rare import NEGLIGIBLE, Tail, either, sufficient_tail
+from tolcontact.statistics.rare import Tail, either, sufficient_tail
+from tolcontact.statistics.rare_searches import NEGLIGIBLE
 from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 
@@ -25,7 +24,6 @@ MIN_SAMPLES = 30_000  # for a search: fewer see too few of an event's regions (s
 COUNTED, MAX_COUNTED = 1500, 3000  # realizations of the first answer, by counting; and of the last, without a common event
 MIN_SHARE = 1 / 30  # of the first realizations: more common sides of events are only counted
 MIN_AT_STOP = 50  # values at a limit that is never exceeded
-UNDEFINED_TAIL = Tail(UNDEFINED, 1.0)
 
 
 def tails(
@@ -64,100 +62,69 @@ def tails(
         terms.TAILS, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress, minutes=minutes,
     )  # fmt: skip
-    program = analysis.program
-    analysis.check_varies(program.draws.varying)
-    return analysis.finest(_answers(analysis, _events(program)))
+    analysis.check_varies(analysis.program.draws.varying)
+    return analysis.finest(_answers(analysis, _events(analysis)))
 
 
-def _answers(analysis: Analysis, events: "dict[str, list[Callable[[Engine], Any]]]") -> Iterator[Callable[[], Answer]]:
+def _answers(analysis: Analysis, events: "dict[str, list[Side]]") -> Iterator[Callable[[], Answer]]:
     """Yield answers by counting in more and more realizations, and then by searches for one event after the other."""
     samples, dimensions = analysis.samples, len(analysis.program.draws.varying)
-    engine = analysis.engine(sum(map(len, events.values())) * samples)
-    counts = [Count([make_score(engine) for make_score in sides]) for sides in events.values()]
-    statuses, searched = np.zeros_like(engine.statuses), list[tuple[Tail, np.ndarray]]()
+    analysis.expect(sum(map(len, events.values())) * samples)
+    statuses, searched = np.zeros_like(analysis.statuses), list[tuple[Tail, np.ndarray]]()
 
     def answer() -> Answer:
-        total = int(statuses.sum())
+        total, counted = int(statuses.sum()), list(events.values())[len(searched) :]
         found = [f"{len(searched)} of {len(events)} events are searched for"] if searched else []
         coarse = "; ".join([*found, f"the {'others' if found else 'events'} are counted among {total} realizations"])
-        tails = [tail for tail, _ in searched] + [count.tail() for count in counts[len(searched) :]]
-        by_status = [statuses + further for _, further in searched] + [statuses] * (len(events) - len(searched))
+        tails = [tail for tail, _ in searched] + [_tail(sides) for sides in counted]
+        by_status = [statuses + further for _, further in searched] + [statuses] * len(counted)
         values = {
             "probability": [tail.probability for tail in tails],
             "disagreement": [tail.disagreement for tail in tails],
-            "stop": np.array([count.is_stop for count in counts], dtype=np.int8),
+            "stop": np.array([any(side.is_stop for side in sides) for sides in events.values()], dtype=np.int8),
             "simulated": np.sum(by_status, axis=1),
             "by_status": by_status,
         }
         return Answer(values, {terms.EVENT: list(events)}, {"samples": samples}, coarse)
 
+    all_sides = [side for sides in events.values() for side in sides]
     rng = np.random.default_rng([analysis.seed, len(events)])
     for start, stop in stages(samples, 1, first=COUNTED):
-        if start >= MAX_COUNTED and not any(any(count.are_common) for count in counts):
+        if start >= MAX_COUNTED and not any(side.is_common for side in all_sides):
             break
         u = rng.standard_normal((stop - start, dimensions))
-        measured, status = simulated_scores(engine, u)
+        measured, status = simulated_scores(analysis, u)
         statuses += np.bincount(status, minlength=len(statuses))
-        for count in counts:
-            count.add(measured, status, u)
+        for side in all_sides:
+            side.hits = np.append(side.hits, side.scores(measured, status, u) > 0)
         yield answer
-    engine.total = engine.simulated + samples * sum(not common for count in counts for common in count.are_common)
-    for number, count in enumerate(counts):
-        before = engine.statuses.copy()
-        for side, score in enumerate(count.scores):  # each has its own region, and could hide the region of the other
-            if not count.are_common[side]:
-                rng = np.random.default_rng([analysis.seed, number, side])
-                tail = sufficient_tail(score, dimensions, samples=samples, rng=rng, leads=score.leads)
-                count.searched[side] = tail
-        searched.append((count.tail(), engine.statuses - before))
+    analysis.total = analysis.simulated + samples * sum(not side.is_common for side in all_sides)
+    for number, sides in enumerate(events.values()):
+        before = analysis.statuses.copy()
+        for place, side in enumerate(sides):  # each has its own region, and could hide the region of the other
+            if not side.is_common:
+                rng = np.random.default_rng([analysis.seed, number, place])
+                side.searched = sufficient_tail(side, dimensions, samples=samples, rng=rng, leads=side.leads)
+        searched.append((_tail(sides), analysis.statuses - before))
         yield answer
 
 
-class Count:
-    """The sides of an event among the same realizations, each with its score; a rare side is `searched` for, too.
+def _tail(sides: "list[Side]") -> Tail:
+    """Return the probability of an event: counted, but for the sides that were searched for.
 
-    hits  for each side (n,), whether a realization is beyond it
+    If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
     """
-
-    def __init__(self, scores: list[Any]) -> None:
-        self.scores, self.hits = scores, [np.zeros(0, dtype=bool) for _ in scores]
-        self.searched: dict[int, Tail] = {}
-
-    def add(self, measured: np.ndarray, status: np.ndarray, u: np.ndarray) -> None:
-        """Add realizations at normal scores u (n, d)."""
-        self.hits = [
-            np.append(hits, score.of(measured, status, u) > 0) for hits, score in zip(self.hits, self.scores, strict=True)
-        ]
-
-    @property
-    def are_common(self) -> list[bool]:
-        """Whether each side has so many hits among the first realizations that a search would not be more accurate.
-
-        They are a twentieth of those that are counted, so this choice changes no estimate by more than a hundredth.
-        """
-        return [bool(hits[:COUNTED].sum() >= MIN_SHARE * min(COUNTED, len(hits))) and len(hits) > 0 for hits in self.hits]
-
-    @property
-    def is_stop(self) -> bool:
-        """Whether one of the sides is a stop."""
-        return any(score.is_stop for score in self.scores)
-
-    def tail(self) -> Tail:
-        """Return the probability of the event: counted, but for the sides that were searched for.
-
-        If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
-        """
-        if any(score.is_undefined for score in self.scores):
-            return UNDEFINED_TAIL
-        exceedable = {side for side, score in enumerate(self.scores) if not score.is_stop} or set(range(len(self.scores)))
-        counted = [self.hits[side] for side in exceedable - set(self.searched)]
-        tails = [tail for side, tail in self.searched.items() if side in exceedable]
-        return either([*tails, *([Tail(proportion(np.any(counted, axis=0)), 1.0)] if counted else [])])
+    if any(side.is_undefined for side in sides):
+        return Tail(UNDEFINED, 1.0)
+    exceedable = [side for side in sides if not side.is_stop] or sides
+    counted = [side.hits for side in exceedable if side.searched is None]
+    tails = [side.searched for side in exceedable if side.searched is not None]
+    return either([*tails, *([Tail(proportion(np.any(counted, axis=0)), 1.0)] if counted else [])])
 
 
-def simulated_scores(engine: Engine, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def simulated_scores(analysis: Analysis, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return measures (n, state, measure) and statuses (n,) for normal scores u (n, d) of the contributors that vary."""
-    draws = engine.program.draws
+    draws = analysis.program.draws
     place = {label: k for k, label in enumerate(draws.varying)}
 
     def numbers(label: str) -> np.ndarray:
@@ -165,18 +132,18 @@ def simulated_scores(engine: Engine, u: np.ndarray) -> tuple[np.ndarray, np.ndar
             return np.asarray(ndtr(u[:, place[label]]).clip(MIN_UNIFORM, 1 - MIN_UNIFORM))
         return np.full(len(u), 0.5)
 
-    return engine.simulate_deviations(draws.from_numbers(numbers, len(u)))
+    return analysis.simulate_deviations(draws.from_numbers(numbers, len(u)))
 
 
-def _events(program: Program) -> "dict[str, list[Callable[[Engine], Any]]]":
-    """Return the scores of the mutually exclusive sides of each event. Raises OptionError if there is no event."""
-    events: dict[str, list[Callable[[Engine], Any]]] = {}
+def _events(analysis: Analysis) -> "dict[str, list[Side]]":
+    """Return the mutually exclusive sides of each event. Raises OptionError if there is no event."""
+    program, events = analysis.program, dict[str, list[Side]]()
     for number, measure in enumerate(program.nominal.measures):
         limits = program.limits(number)
         if not limits.are_open:
-            events[f"{measure.name} outside limits"] = [partial(_Beyond, measure=number, limits=side) for side in limits.sides]
+            events[f"{measure.name} outside limits"] = [Side(analysis, number, side) for side in limits.sides]
     if program.method.is_exact and program.nominal.pairs:
-        events["not assemblable"] = [NotAssemblable]
+        events["not assemblable"] = [Side(analysis)]
     if not events:
         raise OptionError(
             f'"{program.nominal.assembly.name}" has no rare event: no measurement has limits, and parts can always be '
@@ -185,28 +152,34 @@ def _events(program: Program) -> "dict[str, list[Callable[[Engine], Any]]]":
     return events
 
 
-class _Beyond:
-    """The score of one side of a measure's limits: the excess of values over the limit and their accuracy.
+class Side:
+    """One side of the limits of a measure; without a measure, the event that parts cannot be assembled.
 
-    leads          whether scores outside the event state how near it is
-    is_undefined   whether the measure is not a number in realizations of non-negligible probability
+    Its score is the excess of values over the limit and their accuracy, or else 1 inside the event and -1 outside.
+
+    hits          (n,) whether each counted realization is beyond
+    searched      the result of a search, if there was one
+    leads         whether scores outside the event state how near it is
+    is_undefined  whether the measure is not a number in realizations of non-negligible probability
     """
 
-    leads = True
-
-    def __init__(self, engine: Engine, measure: int, limits: Limits) -> None:
-        self._engine, self._measure, self._limits = engine, measure, limits
+    def __init__(self, analysis: Analysis, measure: int | None = None, limits: Limits | None = None) -> None:
+        self._analysis, self._measure, self._limits = analysis, measure, limits
         self._beyond = self._at_limit = 0
-        self.is_undefined = False
+        self.hits, self.leads, self.is_undefined = np.zeros(0, dtype=bool), measure is not None, False
+        self.searched: Tail | None = None
 
     def __call__(self, u: np.ndarray) -> np.ndarray:
-        return self.of(*simulated_scores(self._engine, u), u)
+        return self.scores(*simulated_scores(self._analysis, u), u)
 
-    def of(self, measured: np.ndarray, _: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the scores (n,) of measures (n, state, measure) at normal scores u (n, d)."""
+    def scores(self, measured: np.ndarray, status: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the scores (n,) of measures (n, state, measure) and statuses (n,) at normal scores u (n, d)."""
+        if self._measure is None or self._limits is None:
+            return np.where(status == terms.Status.NOT_ASSEMBLABLE, 1.0, -1.0)
+        values = measured[:, terms.CORRECTED, self._measure]
         is_likely = gammaincc(u.shape[1] / 2, (u**2).sum(axis=1) / 2) > NEGLIGIBLE  # otherwise only inflation leads there
-        self.is_undefined |= bool(np.isnan(measured[is_likely, terms.CORRECTED, self._measure]).any())
-        excess = np.nan_to_num(self._limits.excess(measured[:, terms.CORRECTED, self._measure]), nan=-np.inf, posinf=np.inf)
+        self.is_undefined |= bool(np.isnan(values[is_likely]).any())
+        excess = np.nan_to_num(self._limits.excess(values), nan=-np.inf, posinf=np.inf)
         self._beyond += int((excess > 0).sum())
         self._at_limit += int(((excess >= -2 * self._limits.accuracy) & (excess <= 0)).sum())
         return excess
@@ -216,18 +189,10 @@ class _Beyond:
         """Whether many values, including inflated ones, were at the limit, and none beyond."""
         return self._beyond == 0 and self._at_limit >= MIN_AT_STOP
 
+    @property
+    def is_common(self) -> bool:
+        """Whether so many of the first realizations are hits that a search would not be more accurate.
 
-class NotAssemblable:
-    """The score of the event that parts cannot be assembled: 1 inside, -1 outside."""
-
-    leads = is_stop = is_undefined = False
-
-    def __init__(self, engine: Engine) -> None:
-        self._engine = engine
-
-    def __call__(self, u: np.ndarray) -> np.ndarray:
-        return self.of(*simulated_scores(self._engine, u), u)
-
-    def of(self, _: np.ndarray, status: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the scores (n,) of statuses (n,) at normal scores u (n, d)."""
-        return np.where(status == terms.Status.NOT_ASSEMBLABLE, 1.0, -1.0)
+        They are a twentieth of those that are counted, so this choice changes no estimate by more than a hundredth.
+        """
+        return bool(self.hits[:COUNTED].sum() >= MIN_SHARE * min(COUNTED, len(self.hits))) and len(self.hits) > 0

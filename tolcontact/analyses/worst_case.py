@@ -9,11 +9,9 @@ import xarray as xr
 
 from tolcontact import poses, vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
-from tolcontact.analyses.analysis import Analysis, Engine, Progress
-from tolcontact.analyses.answers import Answer
-from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher, Searches
-from tolcontact.analyses.farthest_pose import farthest_poses
-from tolcontact.analyses.linear_model import LinearModel, linear_model
+from tolcontact.analyses.analysis import Analysis, Answer, Progress
+from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher, Searches, begun, best_of
+from tolcontact.analyses.linear_model import LinearModel, farthest_poses, linear_model
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.features.freedoms import FORM
@@ -25,70 +23,7 @@ from tolcontact.workflow.models import Choice, Model
 PER_LEVEL, PER_CONTRIBUTOR = 20.0, 6.0  # combinations that a search needs at each step length
 PER_POLISH, PER_POLISHED_CONTRIBUTOR = 110.0, 22.0  # combinations that polishing an end needs
 EXCHANGES = 24  # combinations at which influences are looked for
-MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of continued searches, and their first step
 END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values closer than this have the same end
-NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes do not count as influence
-SINGLE = 2  # combinations with exchanges of one contributor at a time
-MAX_ROUNDS = 8
-
-
-class Influences:
-    """The contributors of a region with a known influence on each measure with contact.
-
-    They are found by exchanging deviations between combinations. Contributors that vary jointly, such as the components of a
-    feature in a zone, are exchanged jointly, so that the resulting combinations also lie in the region. Contributors without
-    influence anywhere are identified by exchanging all of them at once.
-
-    spread     (measure,) difference between the largest and the least value of random points
-    is_active  (measure, contributor)
-    """
-
-    def __init__(self, region: AllowedRegion, evaluation: Evaluation, spread: np.ndarray) -> None:
-        self._evaluation, self._units = evaluation, region.independent_columns
-        self._tolerances = NEGLIGIBLE * spread
-        self.is_active = np.zeros((len(spread), len(region.lower)), dtype=bool)
-
-    def explore(self, points: np.ndarray, partners: np.ndarray) -> np.ndarray:
-        """Find influences at points (n, contributor), by exchange with partners (n, contributor).
-
-        Return whether a new influence was found, (measure,).
-        """
-        before = self.is_active.copy()
-        for _ in range(MAX_ROUNDS):
-            hits = self._hidden(points, partners)
-            if not hits.any():
-                break
-            rows = np.flatnonzero(hits.any(axis=1))[:SINGLE]
-            unchanged = self.is_active.copy()
-            self._explore_one_at_a_time(points[rows], partners[rows])
-            interacts = hits[rows].any(axis=0) & (self.is_active == unchanged).all(axis=1)
-            self.is_active[interacts] = True
-        else:
-            self.is_active[hits.any(axis=0)] = True
-        return np.asarray((self.is_active != before).any(axis=1))
-
-    def _hidden(self, points: np.ndarray, partners: np.ndarray) -> np.ndarray:
-        """Return whether a joint exchange of all contributors without known influence changes a measure, (n, measure)."""
-        mixed = np.where(self.is_active[:, None], points, partners)
-        changes = self._changes(self._corrected(points)[None], self._corrected(mixed))
-        return np.asarray(changes[np.arange(len(mixed)), :, np.arange(len(mixed))].T)
-
-    def _explore_one_at_a_time(self, points: np.ndarray, partners: np.ndarray) -> None:
-        """Mark contributors as active if their exchange changes a measure at any of the points (n, contributor)."""
-        mixed = np.repeat(points[:, None], len(self._units), axis=1)
-        for unit, columns in enumerate(self._units):
-            mixed[:, unit, columns] = partners[:, columns]
-        changes = np.any(self._changes(self._corrected(points)[:, None], self._corrected(mixed)), axis=0)
-        for unit, columns in enumerate(self._units):
-            self.is_active[np.ix_(np.flatnonzero(changes[unit]), columns)] = True
-
-    def _corrected(self, points: np.ndarray) -> np.ndarray:
-        return self._evaluation.corrected(points)[..., terms.CORRECTED, :]
-
-    def _changes(self, values: np.ndarray, exchanged: np.ndarray) -> np.ndarray:
-        """Return whether measures (..., measure) differ, including where only one of them is certified."""
-        with np.errstate(invalid="ignore"):
-            return np.asarray((np.abs(values - exchanged) > self._tolerances) | (np.isnan(values) != np.isnan(exchanged)))
 
 
 def worst_case(
@@ -101,7 +36,7 @@ def worst_case(
         deviations  (measure, state, end, contributor)  the combination that causes it
         bound       (measure, state, end)               linear estimate. Raw: the sum of all tolerances times their nominal
                                                         sensitivities. Corrected: in the linear model no pose free of
-                                                        penetration lies beyond (see tolcontact.analyses.farthest_pose);
+                                                        penetration lies beyond (see tolcontact.analyses.linear_model);
                                                         infinite if contact or springs alone would have to hold
                                                         the part
         random      (measure, state, end)               the worst of `samples` random combinations
@@ -117,7 +52,7 @@ def worst_case(
     tolcontact.analyses.allowed_space describes the region of the combinations. With contact a measure is neither smooth nor
     concave, and the linearized resolution jumps: the searches may miss a worse combination, and `agreeing` states how many of
     them met. Each measure is searched along the contributors that have an influence on it; the others change nothing when they
-    are exchanged all at once, in 24 random combinations and at each end (see tolcontact.analyses.worst_case).
+    are exchanged all at once, in 24 random combinations and at each end (see tolcontact.analyses.extreme_search).
     `samples` / 256 searches start at the best of all trial combinations: random ones, the first `samples` rows of each
     population, the far ends along nominal sensitivities, and the far ends along the slopes of a regression; `samples` / 128
     start at any of them (see tolcontact.analyses.extreme_search). The best one continues in other random directions until it
@@ -146,11 +81,12 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
 def _answers(analysis: Analysis, effort: Effort) -> Iterator[Callable[[], Answer]]:
     """Yield the worst of random combinations, which searches then improve, and the result of the searches."""
     analysis.check_rigid("ask for tails, or run many realizations")
-    program, engine = analysis.program, analysis.engine(analysis.samples)
+    analysis.expect(analysis.samples)
+    program = analysis.program
     region = AllowedRegion(program.draws, seed=analysis.seed)
     analysis.check_varies(region.varies.size)
-    linear, evaluation, rng = linear_model(program), Evaluation(engine, region), np.random.default_rng(analysis.seed)
-    engine.total += _expected(np.full(len(program.nominal.measures), region.moves.size), effort)
+    linear, evaluation, rng = linear_model(program), Evaluation(analysis, region), np.random.default_rng(analysis.seed)
+    analysis.total += _expected(np.full(len(program.nominal.measures), region.moves.size), effort)
     _check_defined(
         program, ~np.isfinite(np.column_stack([linear.measures, linear.by_deviations, linear.by_motion])).all(axis=1)
     )
@@ -159,20 +95,26 @@ def _answers(analysis: Analysis, effort: Effort) -> Iterator[Callable[[], Answer
     if not np.isfinite(measured[:, terms.CORRECTED]).any():
         raise OptionError(f'"{analysis.assembly}" cannot be resolved for any of {len(starts)} combinations tried')
     spread = np.nanmax(measured, axis=(0, 1)) - np.nanmin(measured, axis=(0, 1))
-    searches, bound = Searches.begin(starts, measured, effort, rng), farthest_poses(program, region, linear)
+    searches, bound = begun(starts, measured, effort, rng), farthest_poses(program, region, linear)
     random = np.stack([np.nanmin(measured, axis=0), np.nanmax(measured, axis=0)], axis=-1).swapaxes(0, 1)
 
     def answer(best: Searches | None = None) -> Answer:
-        values = _extremes(program, region, effort, spread, searches, best or searches.best_of(effort.searches))
+        best = best_of(searches, effort.searches) if best is None else best
+        values = _extremes(program, region, effort, spread, searches, best)
+        values |= {"bound": bound, "random": random, "by_status": analysis.statuses}
+        cases = [f"{end} {measure.name}" for measure in program.nominal.measures for end in terms.ENDS]
+        labels = [contributor.label for contributor in program.draws.contributors if contributor.source == FORM]
+        formed = dict.fromkeys(label.rpartition(".")[0] for label in labels)
+        without = {terms.WITHOUT_FORM: ", ".join(formed)} if formed else {}
+        attributes = {"random_combinations": analysis.samples, "searches": effort.searches, **without}
         text = f"the worst among {len(starts)} combinations, and of searches that have not ended"
-        return _answer(analysis, effort, values | {"bound": bound, "random": random, "by_status": engine.statuses}, text)
+        return Answer(values, {terms.CASE: cases}, attributes, text)
 
     yield answer
-    influences = Influences(region, evaluation, spread)
-    influences.explore(starts[rng.choice(len(starts), EXCHANGES)], region.scattered(rng, EXCHANGES))
-    searcher = Searcher(region, evaluation, spread, influences.is_active, rng, effort.finest_step)
-    advanced = _forecast(engine, influences.is_active.sum(axis=1), effort)
-    best = _searched(searcher, searches, influences, effort, advanced, region.scattered(rng, EXCHANGES))
+    searcher = Searcher(region, evaluation, spread, rng, effort)
+    searcher.explore(starts[rng.choice(len(starts), EXCHANGES)], region.scattered(rng, EXCHANGES))
+    advanced = _forecast(analysis, searcher.is_active.sum(axis=1), effort)
+    best = searcher.run(searches, advanced, region.scattered(rng, EXCHANGES))
     _check_defined(program, evaluation.is_undefined)
     yield lambda: answer(best)
 
@@ -184,7 +126,7 @@ def _extremes(
     values = searches.value.reshape(-1, effort.searches)
     tolerances = END_TOLERANCE * spread[best.measure]
     ends = 1 + (np.diff(np.sort(values[:, effort.best :], axis=1), axis=1) > tolerances[:, None]).sum(axis=1)
-    corrected = best.take(np.flatnonzero(best.state == terms.CORRECTED))
+    corrected = best[best.state == terms.CORRECTED]
     shape = (len(program.nominal.measures), len(terms.STATES), len(terms.ENDS))
     return {
         "worst": (best.sense * best.value).reshape(shape),
@@ -194,17 +136,6 @@ def _extremes(
         "unseen": np.minimum(1.0, ends * (ends + 1) / (effort.random * (effort.random - 1))).reshape(shape),
         **_as_realizations(program, region.deviations(corrected.point)),
     }
-
-
-def _answer(analysis: Analysis, effort: Effort, values: dict[str, np.ndarray], coarse: str) -> Answer:
-    """Return the answer with these values."""
-    program = analysis.program
-    cases = [f"{end} {measure.name}" for measure in program.nominal.measures for end in terms.ENDS]
-    labels = [contributor.label for contributor in program.draws.contributors if contributor.source == FORM]
-    formed = dict.fromkeys(label.rpartition(".")[0] for label in labels)
-    without = {terms.WITHOUT_FORM: ", ".join(formed)} if formed else {}
-    attributes = {"random_combinations": analysis.samples, "searches": effort.searches, **without}
-    return Answer(values, {terms.CASE: cases}, attributes, coarse)
 
 
 def _check_defined(program: Program, is_undefined: np.ndarray) -> None:
@@ -218,45 +149,22 @@ def _check_defined(program: Program, is_undefined: np.ndarray) -> None:
         )
 
 
-def _searched(
-    searcher: Searcher, searches: Searches, influences: Influences, effort: Effort, advanced: Callable[[float], None],
-    partners: np.ndarray,
-) -> Searches:  # fmt: skip
-    """Search, and return the best search for each extreme value.
-
-    If an exchange with partners (n, contributor) at an end shows an influence of further contributors, the searches of that
-    measure also continue along these.
-    """
-    for _ in range(MAX_RESTARTS):
-        searcher.search(searches, advanced)
-        searcher.meet(searches, effort.searches)
-        best = searches.best_of(effort.searches)
-        points = np.repeat(best.point[best.state == terms.CORRECTED], len(partners), axis=0)
-        is_new = influences.explore(points, np.resize(partners, points.shape))
-        rows = np.flatnonzero(is_new[searches.measure] & (searches.state == terms.CORRECTED))
-        if not rows.size:
-            break
-        searches.step[rows] = RESTART_STEP
-    searcher.polish(best)
-    return best
-
-
 def _expected(active: np.ndarray, effort: Effort) -> int:
     """Return the approximate number of combinations of all searches, with `active` (measure,) contributors each."""
     return round(len(terms.ENDS) * effort.searches * effort.levels * (PER_LEVEL + PER_CONTRIBUTOR * active).sum())
 
 
-def _forecast(engine: Engine, active: np.ndarray, effort: Effort) -> Callable[[float], None]:
-    """Return a function that revises the engine's total when a share of the searches is finished.
+def _forecast(analysis: Analysis, active: np.ndarray, effort: Effort) -> Callable[[float], None]:
+    """Return a function that revises the expected total when a share of the searches is finished.
 
     active   (measure,) number of contributors along which each measure is searched
     """
-    before, of_searches = engine.simulated, _expected(active, effort)
+    before, of_searches = analysis.simulated, _expected(active, effort)
     of_polishing = round(len(terms.ENDS) * (PER_POLISH + PER_POLISHED_CONTRIBUTOR * active).sum())
 
     def advanced(share: float) -> None:
-        expected = (1 - share) * of_searches + engine.simulated - before
-        engine.total = engine.simulated + round((1 - share) * expected) + of_polishing
+        expected = (1 - share) * of_searches + analysis.simulated - before
+        analysis.total = analysis.simulated + round((1 - share) * expected) + of_polishing
 
     advanced(0.0)
     return advanced

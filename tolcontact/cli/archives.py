@@ -78,8 +78,8 @@ def report(
         if page is not None:
             reports.write_page(  # few reports need the model, and all that it takes to build it
                 results, summary, page, titles,
-                lambda: import_module("tolcontact.analyses.first_order").first_order_variances(results),
-                lambda: import_module("tolcontact.analyses.rigid_parts").rigid_values(results),
+                lambda: import_module("tolcontact.analyses.rebuilt").first_order_variances(results),
+                lambda: import_module("tolcontact.analyses.rebuilt").rigid_values(results),
             )  # fmt: skip
         if xlsx is not None:
             reports.write_spreadsheet(results, summary, xlsx, titles)

@@ -10,7 +10,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.errors import TolcontactError
 from tolcontact.realizations import declaration_of
 from tolcontact.report.figures import NO_INTERVAL, grouped, percent
-from tolcontact.statistics.linear_shares import (
+from tolcontact.statistics.variance_shares import (
     MIN_EFFECTIVE,
     MIN_R2,
     MIN_RESIDUALS,

@@ -8,7 +8,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.report.figures import number, percent
 from tolcontact.report.table import Table
-from tolcontact.statistics.convention import ACCURACY
+from tolcontact.statistics.contact import ACCURACY
 
 MAX_LINES = 8  # about figures that depend on the objective
 NOTICED = 0.01  # share of realizations with offsets that nothing explains

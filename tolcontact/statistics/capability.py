@@ -55,25 +55,13 @@ VERDICT_RULE = (
 ).replace("95  %", "95 %")
 
 
-def share_below(x: Sample, limits: Limits, missing: int = 0) -> Estimate:
-    """Return the share of values below the lower limit, with its exact interval; undefined if that side is open.
-
-    There are `missing` values more, of realizations that cannot be assembled.
-    """
-    return proportion(x.map(limits.below).followed_by(missing * [False])) if np.isfinite(limits.lower) else UNDEFINED
-
-
-def share_above(x: Sample, limits: Limits, missing: int = 0) -> Estimate:
-    """Return the share of values above the upper limit (see share_below)."""
-    return proportion(x.map(limits.above).followed_by(missing * [False])) if np.isfinite(limits.upper) else UNDEFINED
-
-
-def share_outside(x: Sample, limits: Limits, missing: int = 0) -> Estimate:
+def share_outside(x: Sample, limits: Limits, missing: int = 0, *, counts_missing: bool = True) -> Estimate:
     """Return the share out of specification, with its exact interval; undefined without limits.
 
-    These are values beyond the limits, and the `missing` ones: a product that cannot be assembled is a nonconforming one.
+    These are values beyond the limits and, if `counts_missing`, the `missing` values of realizations that cannot be assembled:
+    such a product is a nonconforming one.
     """
-    return UNDEFINED if limits.are_open else proportion(x.map(limits.outside).followed_by(missing * [True]))
+    return UNDEFINED if limits.are_open else proportion(x.map(limits.outside).followed_by(missing * [counts_missing]))
 
 
 def without_stops(x: Sample, limits: Limits) -> Limits:
@@ -165,10 +153,8 @@ def _side(x: Sample, spread: Estimate, limit: float, sign: float) -> Estimate:
     correlation = sign * float(np.sign(reach)) * skew / math.sqrt(max(kurt - 1, MIN_SKEW))
     if x.count < MIN_SHAPE or kurt > MAX_KURTOSIS:
         correlation = max(correlation, 0.0)
-    below, above = (
-        hypotenuse(of_mean - index, of_spread - index, correlation)
-        for of_mean, of_spread in zip(by_mean, by_spread, strict=True)
-    )
+    distances = np.transpose([by_mean, by_spread]) - index
+    below, above = (hypotenuse(of_mean, of_spread, correlation) for of_mean, of_spread in distances.tolist())
     return Estimate(index, index - below, index + above)
 
 
@@ -179,13 +165,10 @@ def _pp(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np
 
 def _sides(low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> list[np.ndarray]:
     """Return the index of each side that has a limit."""
-    lower, upper, _ = limits
     with np.errstate(divide="ignore", invalid="ignore"):
-        sides = [
-            (lower, np.divide(np.subtract(median, lower), _width(low, median, limits))),
-            (upper, np.divide(np.subtract(upper, median), _width(median, high, limits))),
-        ]
-    return [index for limit, index in sides if np.isfinite(limit)]
+        below = np.divide(np.subtract(median, limits.lower), _width(low, median, limits))
+        above = np.divide(np.subtract(limits.upper, median), _width(median, high, limits))
+    return [index for limit, index in zip(limits, (below, above), strict=False) if np.isfinite(limit)]
 
 
 def _width(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np.ndarray:
@@ -197,11 +180,9 @@ def _width(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) ->
 def _with_interval(estimate: np.ndarray, worst: np.ndarray, best: Sequence[np.ndarray]) -> Estimate:
     """Return an estimate with the interval that covers 95 % of simulated indices, given their worst and best values."""
     low = np.quantile(np.where(np.isnan(worst), 0.0, worst), 0.5 - CONFIDENCE / 2, method="inverted_cdf")
-    highs = [
-        np.quantile(np.where(np.isnan(of_side), np.inf, of_side), 0.5 + CONFIDENCE / 2, method="inverted_cdf")
-        for of_side in best
-    ]
-    return Estimate(float(estimate), float(min(low, estimate)), float(max(min(highs), estimate)))
+    bests = [np.where(np.isnan(of_side), np.inf, of_side) for of_side in best]
+    high = min(np.quantile(of_side, 0.5 + CONFIDENCE / 2, method="inverted_cdf") for of_side in bests)
+    return Estimate(float(estimate), float(min(low, estimate)), float(max(high, estimate)))
 
 
 def _simulated_percentiles(x: Sample) -> tuple[np.ndarray, np.ndarray]:

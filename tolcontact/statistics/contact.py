@@ -1,6 +1,10 @@
-"""Statistics of contact: pairs under load, their reactions, touching points, and bodies that penetrate each other."""
+"""Statistics of contact: pairs under load, their reactions, touching points, bodies that penetrate each other.
+
+Also how much a result depends on the objective: offsets of parts from their locators, and changes under other objectives.
+"""
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,19 +14,26 @@ from tolcontact import vocabulary as terms
 from tolcontact.arrays import Array, Bool
 from tolcontact.realizations import EXISTS, assembled, column, pieces
 from tolcontact.statistics import intervals
+from tolcontact.statistics.measure_statistics import changes_of
 from tolcontact.statistics.sample import Sample
 from tolcontact.vocabulary import ArchiveVariable
 
 MAX_COMBINATIONS = 10  # of pairs under load at the same time
 MAX_PAIRS = 20  # of parts, the most frequent ones
+MIN_COMPARED = 10  # realizations: with fewer, 6 sigma has no interval
+ACCURACY = 1e-6  # mm: a smaller offset is the accuracy of the solver
 CLASHES = (terms.CLASHES, terms.CLASH_DEPTH, terms.CLASH_PART, terms.CLASH_OTHER)
 
 
 def loaded(rows: xr.Dataset) -> np.ndarray:
     """Return the share of realizations with each pair under load, (pair, interval)."""
     counts = np.sum([(piece[terms.CARRYING.name].values > 0).sum(axis=0) for piece in pieces(rows)], axis=0)
-    total = rows.sizes[terms.REALIZATION]
-    return np.array([intervals.proportion_of(int(k), total) for k in counts]).reshape(-1, len(terms.ESTIMATE))
+    return shares(counts.tolist(), rows.sizes[terms.REALIZATION])
+
+
+def shares(counts: Sequence[int], total: int) -> np.ndarray:
+    """Return the shares (n, interval) of counts (n,) among a number of realizations."""
+    return np.array([intervals.proportion_of(count, total) for count in counts]).reshape(-1, len(terms.ESTIMATE))
 
 
 def reactions(rows: xr.Dataset) -> np.ndarray:
@@ -80,8 +91,7 @@ class TouchingShares:
         if not self._realizations:
             return np.full(len(self._counts), np.nan), np.full((len(self._counts), len(terms.BOUNDS)), np.nan), 0
         counts, place = np.unique(self._counts, return_inverse=True)
-        estimates = np.array([intervals.proportion_of(int(count), self._realizations) for count in counts])
-        estimates = np.where(self._is_counted[:, None], estimates.reshape(-1, len(terms.ESTIMATE))[place], np.nan)
+        estimates = np.where(self._is_counted[:, None], shares(counts.tolist(), self._realizations)[place], np.nan)
         return estimates[:, 0], estimates[:, 1:], self._realizations
 
 
@@ -175,3 +185,50 @@ def clashes(rows: xr.Dataset) -> tuple[dict[ArchiveVariable, Any], list[str]]:
         terms.CLASH_DECLARED: labels[order, 2].astype(np.int8),
     }
     return values, [f"{names[first_part]} / {names[second_part]}" for first_part, second_part, _ in labels[order]]
+
+
+def offset_values(rows: xr.Dataset) -> dict[ArchiveVariable, Any]:
+    """Return percentiles of the offset of each part from its locators, and the shares of large ones."""
+    parts, total = rows.sizes[terms.PART], rows.sizes[terms.REALIZATION]
+    beyond = np.full((2, parts, len(terms.ESTIMATE)), np.nan)
+    offset = np.full((parts, len(terms.OFFSET_PERCENTILES), len(terms.ESTIMATE)), np.nan)
+    values = {terms.OFFSET: offset, terms.OFFSET_BEYOND: beyond[0], terms.OFFSET_UNEXPLAINED: beyond[1]}
+    if terms.LOCATOR_OFFSET.name not in rows:  # an archive of an earlier version
+        return values
+    variations, columns = rows[terms.LOCATOR_VARIATION.name].values, [v.name for v in (terms.LOCATOR_OFFSET, terms.GAP_MIN)]
+    counts = np.zeros((2, parts), dtype=int)
+    for piece in pieces(rows[[*columns, terms.STATUS.name]]):
+        offsets, gaps = (np.asarray(piece[name].values) for name in columns)
+        depths = np.maximum(-np.fmin.reduce(gaps[:, terms.RAW], axis=1, initial=0), 0)
+        is_certified = np.isin(piece[terms.STATUS.name].values, terms.CERTIFIED)
+        counts[0] += (offsets > variations + ACCURACY).sum(axis=0)
+        counts[1] += ((offsets > variations + depths[:, None] + ACCURACY) & is_certified[:, None]).sum(axis=0)
+    for part in np.flatnonzero(np.isfinite(variations)).tolist():
+        x = Sample.of(column(rows, terms.LOCATOR_OFFSET, part=part))
+        offset[part] = intervals.percentiles(x, list(terms.OFFSET_PERCENTILES.values()))
+        beyond[:, part] = shares(counts[:, part].tolist(), total)
+    return values
+
+
+def other_objectives(results: xr.DataTree) -> list[str]:
+    """Return the objectives that a run was compared with; empty if it was not."""
+    if terms.OBJECTIVES_GROUP not in results.children:
+        return []
+    return [str(name) for name in results[terms.OBJECTIVES_GROUP].to_dataset()[terms.BY_OBJECTIVE].values[1:]]
+
+
+def changes_by_objective(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
+    """Return the changes of corrected measures if another objective decided, from realizations certified under both."""
+    others, measures = other_objectives(results), results.to_dataset().sizes[terms.MEASURE]
+    changes = np.full((len(others), measures, len(terms.CHANGES), len(terms.ESTIMATE)), np.nan)
+    counts = np.zeros(len(others), dtype=np.int64)
+    for k in range(len(others)):
+        group = results[terms.OBJECTIVES_GROUP].to_dataset()
+        measured, statuses = (group[v.name].values for v in (terms.MEASURED_BY_OBJECTIVE, terms.STATUS_BY_OBJECTIVE))
+        both = np.isin(statuses[0], terms.CERTIFIED) & np.isin(statuses[k + 1], terms.CERTIFIED)
+        counts[k] = both.sum()
+        for measure in range(measures if counts[k] >= MIN_COMPARED else 0):
+            baseline, x = (Sample.of(values[both, measure]) for values in (measured[0], measured[k + 1]))
+            if np.isfinite(baseline.mean + x.mean):
+                changes[k, measure] = changes_of(baseline, x)
+    return {terms.BY_OTHER_OBJECTIVE: changes, terms.COMPARED_BY_OBJECTIVE: counts}

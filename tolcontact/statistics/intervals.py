@@ -2,6 +2,10 @@
 
 Every function takes a sample, an array (realization,) or a Sample, and returns (estimate, lower, upper). No interval assumes a
 normal distribution, since contact truncates distributions.
+
+Two samples are `paired` if realization k of both forms a pair. Pairs are independent of each other whether or not their two
+members are, so paired intervals hold for any two runs with the same number of realizations; equal draws make them narrow. In
+runs with a sampling plan the differences of replicates determine the width of intervals (see Sample.widening).
 """
 
 import math
@@ -99,30 +103,25 @@ def from_standardized_influence(x: Sample, estimate: float, influence: Sequence[
     return _from_sums(estimate, x.count, squares * widening**2, cubes * widening**3, fourths * widening**4)
 
 
-def is_shape_known(x: Sample) -> bool:
-    """Return whether skewness and kurtosis have an interval: their spread depends on moments that small samples do not give."""
-    return x.count >= MIN_SHAPE and x.standardized_moments[4] < MAX_KURTOSIS
-
-
 def skewness(x: np.ndarray | Sample) -> Estimate:
     """Return the third central moment over the cube of the standard deviation; 0 for a symmetric distribution."""
-    x = Sample.of(x)
-    if is_constant(x):
-        return UNDEFINED
-    skew = float(x.standardized_moments[3])
-    if not is_shape_known(x):
-        return Estimate(skew, math.nan, math.nan)
-    return from_standardized_influence(x, skew, [0.5 * skew, -3, -1.5 * skew, 1])
+    return _shape(Sample.of(x), 3)
 
 
 def kurtosis(x: np.ndarray | Sample) -> Estimate:
     """Return the fourth central moment over the square of the variance; 3 for a normal distribution."""
-    x = Sample.of(x)
+    return _shape(Sample.of(x), 4)
+
+
+def _shape(x: Sample, order: int) -> Estimate:
+    """Return a standardized moment. Small samples do not give the moments that its spread depends on."""
     if is_constant(x):
         return UNDEFINED
     skew, kurt = x.standardized_moments[3:5].tolist()
-    if not is_shape_known(x):
-        return Estimate(kurt, math.nan, math.nan)
+    if x.count < MIN_SHAPE or not kurt < MAX_KURTOSIS:
+        return Estimate(skew if order == 3 else kurt, math.nan, math.nan)
+    if order == 3:
+        return from_standardized_influence(x, skew, [0.5 * skew, -3, -1.5 * skew, 1])
     return from_standardized_influence(x, kurt, [kurt, -4 * skew, -2 * kurt, 0, 1])
 
 
@@ -197,26 +196,83 @@ def proportion_of(k: float, n: float) -> Estimate:
     return Estimate(k / n, float(lower), float(upper))
 
 
-def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -> Estimate:
-    """Return the ratio of the variances of `sample` and `baseline`, from the same realizations (paired, on the log scale)."""
+def shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
+    """Return the difference of the means: Student's t of paired differences, or Welch's interval."""
+    if paired:
+        return mean(sample - baseline)
+    squared_errors = [x.moments[0] / (x.count - 1) * x.widening**2 for x in (sample, baseline)]
+    difference, total = sample.mean - baseline.mean, sum(squared_errors)
+    if not (sample.determines_moments and baseline.determines_moments):
+        return Estimate(difference, math.nan, math.nan)
+    if not total > 0:
+        return Estimate(difference, difference, difference) if math.isfinite(difference) else UNDEFINED
+    freedom = total**2 / sum(error**2 / (x.count - 1) for error, x in zip(squared_errors, (sample, baseline), strict=True))
+    half = student(freedom) * math.sqrt(total)
+    return Estimate(difference, difference - half, difference + half)
+
+
+def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample, *, paired: bool = True) -> Estimate:
+    """Return the ratio of the variances, with an interval on the log scale.
+
+    If the samples are not paired, it comes from the intervals of both (Zou and Donner, 2008). If the lower bound of the second
+    variance is 0, the ratio then has no upper bound.
+    """
     sample, baseline = Sample.of(sample), Sample.of(baseline)
-    variance_sample, variance_baseline = sample.moments[0], baseline.moments[0]
     if is_constant(sample) or is_constant(baseline):
         return UNDEFINED
+    if not paired:
+        (value, lower, upper), (base, base_lower, base_upper) = np.array([variance(x) for x in (sample, baseline)])
+        with np.errstate(divide="ignore"):
+            below, above = np.hypot(np.log([value / lower, upper / value]), np.log([base_upper / base, base / base_lower]))
+        return Estimate(value / base, float(value / base * np.exp(-below)), float(value / base * np.exp(above)))
     # The influence of each realization on the logarithm of the ratio; their sum is zero.
-    influence = Sample(
-        lambda: (
-            (sample.values - sample.mean) ** 2 / variance_sample - (baseline.values - baseline.mean) ** 2 / variance_baseline
-        ),
-        sample.replicate,
-    )
-    ratio, n = variance_sample / variance_baseline, sample.count
+    influence = _standardized_squares(sample) - _standardized_squares(baseline)
+    ratio, n = sample.moments[0] / baseline.moments[0], sample.count
     if n < MIN_RATIO or not (sample.determines_moments and baseline.determines_moments):
         return Estimate(ratio, math.nan, math.nan)
     squares, cubes, fourths = (float((influence.values**k).sum()) for k in (2, 3, 4))
     # The correction for small samples is Bonett's for one variance.
     _, lower, upper = _from_sums(0.0, n, squares + 3, cubes, fourths)
     return Estimate(ratio, ratio * math.exp(lower * influence.widening), ratio * math.exp(upper * influence.widening))
+
+
+def _standardized_squares(x: Sample) -> Sample:
+    return x.map(lambda values: (values - x.mean) ** 2 / x.moments[0])
+
+
+def share_shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
+    """Return the difference of two shares, from samples of booleans.
+
+    If the samples are paired, the distances of the exact bounds of the shares that are gained and lost add up like errors
+    (Zou and Donner, 2008); both shares are correlated. If not, the interval is Wald's after one hit and one miss more in each
+    sample (Agresti and Caffo, 2000).
+    """
+    hits = [x.map(lambda values: values.astype(float)) for x in (sample, baseline)]
+    if paired:
+        change = hits[0] - hits[1]
+        weight = _weight(change)
+        counts = [weight * int((change.values == sign).sum()) for sign in (1, -1)]
+        gained, lost = (proportion_of(count, weight * change.count) for count in counts)
+        odds = math.prod(share.value / (1 - share.value) for share in (gained, lost) if share.value < 1)
+        least = hypotenuse(gained.value - gained.lower, lost.upper - lost.value, math.sqrt(odds))
+        most = hypotenuse(gained.upper - gained.value, lost.value - lost.lower, math.sqrt(odds))
+        difference = gained.value - lost.value
+        return Estimate(difference, max(difference - least, -1.0), min(difference + most, 1.0))
+    counts = [_weight(x) * x.count for x in hits]
+    shares = [(n * x.mean + 1) / (n + 2) for n, x in zip(counts, hits, strict=True)]
+    error = math.sqrt(sum(p * (1 - p) / (n + 2) for p, n in zip(shares, counts, strict=True)))
+    difference, middle = hits[0].mean - hits[1].mean, shares[0] - shares[1]
+    lower, upper = np.clip([middle - _Z * error, middle + _Z * error], -1, 1)
+    return Estimate(difference, min(float(lower), difference), max(float(upper), difference))
+
+
+def _weight(x: Sample) -> float:
+    """Return the number of independent realizations that determine the mean as well as one realization of a sample does.
+
+    It is 1 if replicates do not differ, since that does not make a share certain.
+    """
+    widening = x.widening
+    return 1 / widening**2 if widening > 0 else 1.0
 
 
 def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

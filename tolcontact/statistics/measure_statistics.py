@@ -1,5 +1,6 @@
 """The statistics of a measure: one table of names and functions; and the texts of options that name one."""
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -88,9 +89,11 @@ class MeasuredValues:
         """Pp and Ppk for a normal distribution."""
         return capability.as_normal(self.sample, self.limits)
 
-    def share(self, share: Callable[[Sample, Limits, int], Estimate]) -> Estimate:
-        """Return a share of values beyond limits; undefined if a value is not a number."""
-        return share(self.sample, self.limits, self.missing) if np.isfinite(self.sample.mean) else UNDEFINED
+    def share(self, limits: Limits, *, counts_missing: bool = False) -> Estimate:
+        """Return the share of values beyond limits; undefined if a value is not a number."""
+        if not np.isfinite(self.sample.mean):
+            return UNDEFINED
+        return capability.share_outside(self.sample, limits, self.missing, counts_missing=counts_missing)
 
     def estimate(self, statistic: str) -> Estimate:
         """Return one of `STATISTICS`; undefined, except for the share outside, if fewer than two values exist."""
@@ -107,9 +110,9 @@ STATISTICS: dict[str, Callable[[MeasuredValues], Estimate]] = {
     **{f"{percent:g} %": lambda x, percent=percent: x.percentiles[percent] for percent in terms.PERCENTILES},  # type: ignore[misc]
     terms.SKEWNESS: lambda x: intervals.skewness(x.sample),
     terms.KURTOSIS: lambda x: intervals.kurtosis(x.sample),
-    terms.BELOW: lambda x: x.share(capability.share_below),
-    terms.ABOVE: lambda x: x.share(capability.share_above),
-    terms.OUTSIDE: lambda x: x.share(capability.share_outside),
+    terms.BELOW: lambda x: x.share(x.limits._replace(upper=math.inf)),
+    terms.ABOVE: lambda x: x.share(x.limits._replace(lower=-math.inf)),
+    terms.OUTSIDE: lambda x: x.share(x.limits, counts_missing=True),
     terms.PP: lambda x: x.capability[0],
     terms.PPK: lambda x: x.capability[1],
     terms.PP_NORMAL: lambda x: x.capability_as_normal[0],

@@ -11,7 +11,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.realizations import assembled, declaration_of, is_assembled, pieces, statuses
-from tolcontact.statistics import intervals, two_samples
+from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
 from tolcontact.statistics.summary import summarize
@@ -83,17 +83,8 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
 def _shared_measures(summaries: Mapping[str, xr.Dataset]) -> list[str]:
     """Return the measures that all runs have with the same units and quantity, in the order of the first run."""
     columns = (terms.MEASURE, terms.MEASURE_UNITS.name, terms.QUANTITY.name)
-    tables = [
-        {str(name): (units, quantity) for name, units, quantity in zip(*(summary[c].values for c in columns), strict=True)}
-        for summary in summaries.values()
-    ]
-
-    def is_shared(name: str) -> bool:
-        entries = [table.get(name) for table in tables]
-        units, quantities = ({entry[k] for entry in entries if entry is not None} for k in (0, 1))
-        return None not in entries and len(units) == 1 and len(quantities) == 1
-
-    return [name for name in tables[0] if is_shared(name)]
+    tables = [list(zip(*(summary[column].values for column in columns), strict=True)) for summary in summaries.values()]
+    return [str(row[0]) for row in tables[0] if all(row in table for table in tables)]
 
 
 def _left_out(summaries: Mapping[str, xr.Dataset], shared: list[str]) -> str:
@@ -175,8 +166,8 @@ def _estimates(sample: Sample, baseline: Sample, hits: list[Sample | None], *, p
         return [UNDEFINED] * len(terms.CHANGES_OF_RUNS)
     limited = [x for x in hits if x is not None]
     estimates = {
-        terms.SHIFT: two_samples.shift(sample, baseline, paired=paired),
-        terms.SPREAD_RATIO: intervals.root(two_samples.variance_ratio(sample, baseline, paired=paired)),
-        terms.SHARE_SHIFT: two_samples.share_shift(*limited, paired=paired) if len(limited) == len(hits) else UNDEFINED,
+        terms.SHIFT: intervals.shift(sample, baseline, paired=paired),
+        terms.SPREAD_RATIO: intervals.root(intervals.variance_ratio(sample, baseline, paired=paired)),
+        terms.SHARE_SHIFT: intervals.share_shift(*limited, paired=paired) if len(limited) == len(hits) else UNDEFINED,
     }
     return [estimates[name] for name in terms.CHANGES_OF_RUNS]

@@ -10,15 +10,20 @@ from tolcontact.declaration import UNITS
 from tolcontact.errors import ArchiveError
 from tolcontact.readable import Pictured
 from tolcontact.realizations import finished, pieces, statuses
-from tolcontact.statistics import contact, convention, intervals
-from tolcontact.statistics.contact import surface_values
-from tolcontact.statistics.few_parts import worlds_of
+from tolcontact.statistics import contact, intervals
+from tolcontact.statistics.few_parts import with_few_parts, worlds_of
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, limits, measure_estimates
-from tolcontact.statistics.parts_intervals import with_few_parts
 from tolcontact.vocabulary import ArchiveVariable
 
 MIN_REALIZATIONS = 2
+TEXTS = (
+    terms.NOT_WATCHED,
+    terms.STANDARD,
+    terms.STORED_COORDINATES,
+    terms.ELASTIC_PARTS,
+    terms.CORRELATIONS,
+)  # attributes of runs
 
 
 class Summary(xr.Dataset):  # type: ignore[no-untyped-call]
@@ -90,13 +95,15 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
         terms.STATISTIC_VALUE: statistics,
         terms.CHANGE: changes,
         **_status_values(rows, rigid),
-        **_contact_values(rows, combinations),
-        **convention.offset_values(rows),
-        **convention.changes_by_objective(results),
+        terms.CARRIED: contact.loaded(rows),
+        terms.PAIR_REACTION: contact.reactions(rows),
+        terms.CARRIED_TOGETHER: contact.shares([times for _, times in combinations], count),
+        **contact.offset_values(rows),
+        **contact.changes_by_objective(results),
         terms.STEPS: _steps(rows),
         terms.PENETRATION: _penetration(rows, rigid),
         **clashes,
-        **surface_values(results, terms.NOTICED_SHARE * smallest),
+        **contact.surface_values(results, terms.NOTICED_SHARE * smallest),
         **_field_values(results),
     }
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs["units"]}}
@@ -104,21 +111,18 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
         _coordinates(rows, combinations)
         | {name: (terms.MEASURE, values) for name, values in notes.items()}
-        | {terms.CLASH: clash_names, terms.BY_OBJECTIVE: convention.other_objectives(results)},
+        | {terms.CLASH: clash_names, terms.BY_OBJECTIVE: contact.other_objectives(results)},
         {
             "title": results.attrs["title"],
             "realizations": count,
-            "samples": _planned_samples(results, count),
+            # With rows that were selected from an archive, there are no others.
+            "samples": int(results.attrs["samples"]) if count == int(results.attrs["realizations"]) else count,
             **{name: results.attrs[name] for name in terms.METHOD_ATTRIBUTES},
             "search": results.attrs["search"],
             "datum_shifts": ", ".join(_datum_shifts(results)),
             "smallest_range": smallest,
             terms.INTERFERENCE_DEPTH: float(results.attrs.get(terms.INTERFERENCE_DEPTH, np.nan)),
-            terms.NOT_WATCHED: str(results.attrs.get(terms.NOT_WATCHED, "")),
-            terms.STANDARD: str(results.attrs.get(terms.STANDARD, "")),
-            terms.STORED_COORDINATES: str(results.attrs.get(terms.STORED_COORDINATES, "")),
-            terms.ELASTIC_PARTS: str(results.attrs.get(terms.ELASTIC_PARTS, "")),
-            terms.CORRELATIONS: str(results.attrs.get(terms.CORRELATIONS, "")),
+            **{name: str(results.attrs.get(name, "")) for name in TEXTS},
         },
     )
 
@@ -179,28 +183,25 @@ def _status_values(rows: xr.Dataset, rigid: np.ndarray) -> dict[ArchiveVariable,
     }
 
 
-def _contact_values(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[ArchiveVariable, Any]:
-    """Return how often pairs are under load, alone and in combinations, and their reactions."""
-    total = rows.sizes[terms.REALIZATION]
-    shares = np.array([intervals.proportion_of(count, total) for _, count in combinations])
-    return {
-        terms.CARRIED: contact.loaded(rows),
-        terms.PAIR_REACTION: contact.reactions(rows),
-        terms.CARRIED_TOGETHER: shares.reshape(-1, len(terms.ESTIMATE)),
-    }
-
-
 def _field_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
-    """Return the extremes of the displacement fields, and the number of realizations that all of them cover."""
+    """Return the extremes of the displacement fields, and the number of realizations that all of them cover.
+
+    The extremes (part, state, extreme, interval) are 6 sigma of |u|, and its interval, where a field is least and largest.
+    """
     parts = [str(part) for part in results.to_dataset()[terms.PART].values]
     fields = [results["field"].children[terms.group_of(part)].to_dataset() for part in parts]
     summed = [int(field[terms.FIELD_REALIZATIONS.name]) for field in fields]
-    extremes = [_field_extremes(field, count) for field, count in zip(fields, summed, strict=True)]
     magnitudes = [int(field[terms.MAGNITUDE_REALIZATIONS.name]) for field in fields]
+    extremes = np.full((len(parts), len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)), np.nan)
+    for field, count, extremes_of_part in zip(fields, summed, extremes, strict=True):
+        six_sigma = field[terms.FIELD_SIX_SIGMA.name].sel({terms.COMPONENT: "magnitude"}).values
+        for state, values in enumerate(six_sigma):
+            if count and np.isfinite(values).all():
+                vertices = [values.argmin(), values.argmax()]
+                extremes_of_part[state, :, 0] = values[vertices]
+                extremes_of_part[state, :, 1:] = field[terms.FIELD_INTERVAL.name].values[state, vertices]
     return {
-        terms.FIELD_EXTREME: np.array(extremes).reshape(
-            len(parts), len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)
-        ),
+        terms.FIELD_EXTREME: extremes,
         terms.REALIZATIONS_IN_FIELDS: min(summed, default=0),
         terms.REALIZATIONS_IN_MAGNITUDES: min([*magnitudes, *summed], default=0),
     }
@@ -244,29 +245,5 @@ def _datum_shifts(results: xr.DataTree) -> list[str]:
     """Return the features with a datum at maximum or least material condition, as part.feature."""
     sample = results["sample"].to_dataset()
     labels = zip(sample[terms.CONTRIBUTOR].values, sample[terms.DISTRIBUTION.name].values, strict=True)
-    shifted = [
-        str(label).rpartition(".")[0]
-        for label, distribution in labels
-        if "(M)" in str(distribution) or "(L)" in str(distribution)
-    ]
+    shifted = [str(label).rpartition(".")[0] for label, text in labels if "(M)" in str(text) or "(L)" in str(text)]
     return list(dict.fromkeys(shifted))
-
-
-def _planned_samples(results: xr.DataTree, count: int) -> int:
-    """Return the number of realizations that the run was started with, or `count` if rows were selected from an archive."""
-    return int(results.attrs["samples"]) if count == int(results.attrs["realizations"]) else count
-
-
-def _field_extremes(field: xr.Dataset, count: int) -> np.ndarray:
-    """Return 6 sigma of |u|, and its interval, where a field of `count` realizations is least and largest.
-
-    The extremes are (state, extreme, interval).
-    """
-    extremes = np.full((len(terms.STATES), len(terms.EXTREMES), len(terms.ESTIMATE)), np.nan)
-    six_sigma = field[terms.FIELD_SIX_SIGMA.name].sel({terms.COMPONENT: "magnitude"}).values
-    for state, values in enumerate(six_sigma):
-        if count and np.isfinite(values).all():
-            vertices = [values.argmin(), values.argmax()]
-            extremes[state, :, 0] = values[vertices]
-            extremes[state, :, 1:] = field[terms.FIELD_INTERVAL.name].values[state, vertices]
-    return extremes

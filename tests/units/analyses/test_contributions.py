@@ -8,7 +8,7 @@ from tests import cases
 from tests.helpers import PAPER, compiled
 from tests.test_contributions import of_normal
 from tolcontact.analyses.analysis import independent_groups
-from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
+from tolcontact.analyses.contributions import MixedDraws, ReleasedDraws
 from tolcontact.analyses.linear_model import linear_model
 
 

@@ -9,7 +9,7 @@ import pytest
 import tolcontact as tc
 from tests.helpers import call
 from tests.test_elastic_parts import B, H, L, supported_beam, tips
-from tolcontact.analyses.rigid_parts import rigid_values
+from tolcontact.analyses.rebuilt import rigid_values
 from tolcontact.report.elastic_tables import elastic_tables, reactions_of
 
 FEET = [f"beam.A{k}" for k in range(6)]

@@ -5,7 +5,7 @@ import numpy as np
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
-from tolcontact.analyses.first_order import first_order_variances
+from tolcontact.analyses.rebuilt import first_order_variances
 from tolcontact.report.contributor_shares import shares_or_first_order
 
 

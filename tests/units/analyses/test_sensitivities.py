@@ -5,7 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.analyses.designs import SteppedDraws
+from tolcontact.analyses.sensitivities import SteppedDraws
 
 
 def test_steps_do_not_depend_on_blocks():

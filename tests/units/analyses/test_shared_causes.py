@@ -5,7 +5,8 @@ import pytest
 
 import tolcontact as tc
 from tests.test_datums import plate
-from tolcontact.analyses.designs import MixedDraws, SteppedDraws
+from tolcontact.analyses.contributions import MixedDraws
+from tolcontact.analyses.sensitivities import SteppedDraws
 
 
 def labels_of(model):

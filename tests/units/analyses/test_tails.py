@@ -5,9 +5,9 @@ import pytest
 
 from tests import cases
 from tests.helpers import SEATED, compiled
-from tolcontact.analyses.analysis import Engine
-from tolcontact.analyses.tails import NotAssemblable
-from tolcontact.simulation import map_blocks
+from tolcontact import vocabulary as terms
+from tolcontact.analyses.analysis import Analysis
+from tolcontact.analyses.tails import Side
 from tolcontact.variation.plans import uniform
 
 
@@ -15,7 +15,7 @@ from tolcontact.variation.plans import uniform
 def test_normal_scores_are_drawn_as_in_a_run():
     """Two square pins in two slots, rotations alone; larger deviations do not make assembly possible again."""
     program = compiled(cases.square_pins("rotations"), solver="daqp", method=SEATED)
-    score = NotAssemblable(Engine(program, map_blocks))
+    score = Side(Analysis(terms.TAILS, program))
     u = np.random.default_rng(3).standard_normal((24, len(program.draws.varying)))
     stuck = np.stack([score(factor * u) for factor in 1.3 ** np.arange(7)])
     assert (stuck[1:] >= stuck[:-1]).all() and set(np.unique(stuck)) == {-1.0, 1.0}

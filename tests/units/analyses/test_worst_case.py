@@ -15,10 +15,18 @@ from tests.test_datums import plate
 from tests.test_worst_case import small_ra1, values
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
-from tolcontact.analyses.analysis import Analysis, Engine
-from tolcontact.analyses.extreme_search import Effort, Evaluation
-from tolcontact.analyses.worst_case import Influences, search_worst_case
-from tolcontact.simulation import map_blocks
+from tolcontact.analyses.analysis import Analysis
+from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher
+from tolcontact.analyses.worst_case import search_worst_case
+
+
+def evaluation_of(program, region):
+    return Evaluation(Analysis(terms.WORST_CASE, program), region)
+
+
+def searcher_of(program, region):
+    spread = np.ones(len(program.nominal.measures))
+    return Searcher(region, evaluation_of(program, region), spread, np.random.default_rng(1), Effort(best=1, random=2))
 
 
 def few_searches(model, samples, method=None):
@@ -62,7 +70,7 @@ def test_what_is_found_is_what_the_engine_says_of_the_combination():
     assert few_searches(program, 64).equals(found)
     for state in (0, 1):
         own = found.deviations.isel(measure=0, state=state).values
-        measured = Evaluation(Engine(program, map_blocks), AllowedRegion(program.draws, seed=1)).corrected(own)
+        measured = evaluation_of(program, AllowedRegion(program.draws, seed=1)).corrected(own)
         assert measured[:, state, 0] == pytest.approx(found.worst.isel(measure=0, state=state).values, abs=1e-12)
 
 
@@ -78,8 +86,7 @@ def influences_of(a, count=16):
     program, rng = compiled(a, solver="daqp"), np.random.default_rng(1)
     area = AllowedRegion(program.draws, seed=1)
     points = area.scattered(rng, count)
-    evaluation = Evaluation(Engine(program, map_blocks), area)
-    influences = Influences(area, evaluation, np.ones(len(program.nominal.measures)))
+    influences = searcher_of(program, area)
     influences.explore(points, area.scattered(rng, count))
     return {label for label, is_active in zip(program.nominal.contributors, influences.is_active[0], strict=True) if is_active}
 
@@ -102,7 +109,7 @@ def test_an_influence_that_shows_only_at_some_points_is_found_there():
     """The height max(0, z) does not change between two points below, and does between one below and one above."""
     program = compiled(cases.one_dimensional(0), solver="daqp", method=PAPER)
     area = AllowedRegion(program.draws, seed=1)
-    influences = Influences(area, Evaluation(Engine(program, map_blocks), area), np.ones(1))
+    influences = searcher_of(program, area)
     is_height = np.array([label == "block.Z" for label in program.nominal.contributors])
     low, lower, above = (np.where(is_height, z, area.middle)[None] for z in (-1.5, -2.5, 2.5))
     assert not influences.explore(low, lower).any() and not influences.is_active.any()

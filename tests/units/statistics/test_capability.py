@@ -27,7 +27,8 @@ DISTRIBUTIONS = {
 
 def estimates(values, lower, upper):
     x, limits = Sample.of(values), Limits(lower, upper)
-    shares = [capability.share_below(x, limits), capability.share_above(x, limits), capability.share_outside(x, limits)]
+    sides = limits._replace(upper=np.inf), limits._replace(lower=-np.inf), limits
+    shares = [capability.share_outside(x, side) for side in sides]
     found = [*shares, *capability.by_percentiles(x, limits), *capability.as_normal(x, limits)]
     return dict(zip(("below", "above", "outside", "Pp", "Ppk", "Pp as normal", "Ppk as normal"), found, strict=True))
 
@@ -154,7 +155,7 @@ def test_what_is_just_on_a_limit_is_inside():
     x = Sample.of(np.array([-1.0, 0.0, 1.0, 1.0]))
     for limit, below, above in ((-1.0, 0, 0.75), (0.0, 0.25, 0.5), (1.0, 0.5, 0), (-1 + 1e-9, 0, 0.75), (1 - 1e-9, 0.5, 0)):
         limits = Limits(limit, limit, accuracy=1e-8)
-        assert capability.share_below(x, limits).value == below and capability.share_above(x, limits).value == above
+        assert [capability.share_outside(x, side).value for side in limits.sides] == [below, above]
 
 
 def test_a_lower_limit_is_the_upper_one_of_the_mirrored_values():

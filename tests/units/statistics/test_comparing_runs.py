@@ -6,7 +6,7 @@ from scipy import stats
 
 from tests.helpers import nightly
 from tests.units.statistics.test_plans import clipped
-from tolcontact.statistics import two_samples
+from tolcontact.statistics import intervals
 from tolcontact.statistics.sample import Sample
 from tolcontact.vocabulary import LATIN_HYPERCUBE, MONTE_CARLO, REPLICATE, SOBOL
 
@@ -16,9 +16,9 @@ def hits(generator, p, n):
 
 
 DIFFERENCES = {  # samples of 80 realizations, and the true difference or ratio
-    "shift": (two_samples.shift, lambda g: (g.exponential(2, 80), g.normal(1, 1, 80)), 1.0),
-    "ratio": (two_samples.variance_ratio, lambda g: (g.normal(0, 2, 80), g.uniform(-1, 1, 80)), 12.0),
-    "share": (two_samples.share_shift, lambda g: (hits(g, 0.3, 80), hits(g, 0.1, 80)), 0.2),
+    "shift": (intervals.shift, lambda g: (g.exponential(2, 80), g.normal(1, 1, 80)), 1.0),
+    "ratio": (intervals.variance_ratio, lambda g: (g.normal(0, 2, 80), g.uniform(-1, 1, 80)), 12.0),
+    "share": (intervals.share_shift, lambda g: (hits(g, 0.3, 80), hits(g, 0.1, 80)), 0.2),
 }
 
 
@@ -38,7 +38,7 @@ def test_the_interval_of_a_few_changes_covers():
     """Of 300 realizations 2 leave the limits on average, and none returns: without changes the difference may still be 1 %."""
     covered = 0
     for gained in np.random.default_rng(1).binomial(300, 2 / 300, 500):
-        estimate = two_samples.share_shift(Sample.of(np.arange(300) < gained), Sample.of(np.zeros(300, bool)), paired=True)
+        estimate = intervals.share_shift(Sample.of(np.arange(300) < gained), Sample.of(np.zeros(300, bool)), paired=True)
         covered += estimate.lower <= 2 / 300 <= estimate.upper
     assert covered >= 0.95 * 500
 
@@ -47,7 +47,7 @@ def test_intervals_of_paired_shares_cover():
     generator, inside = np.random.default_rng(6), 0
     for _ in range(500):
         u = generator.random(100)
-        estimate = two_samples.share_shift(Sample.of(u < 0.3), Sample.of((u > 0.05) & (u < 0.2)), paired=True)
+        estimate = intervals.share_shift(Sample.of(u < 0.3), Sample.of((u > 0.05) & (u < 0.2)), paired=True)
         inside += estimate.lower <= 0.15 <= estimate.upper
     assert 463 <= inside <= 492
 
@@ -73,13 +73,13 @@ def test_intervals_of_changes_between_planned_runs_cover(plan, reference_plan, p
         after, before = planned(plan, 2 * k, 0.2), planned(reference_plan, 2 * k + 1)
         shares = [x.map(lambda piece: piece > 1) for x in (after, before)]
         found = {
-            "shift": two_samples.shift(after, before, paired=paired),
-            "ratio": two_samples.variance_ratio(after, before, paired=paired),
-            "share": two_samples.share_shift(*shares, paired=paired),
+            "shift": intervals.shift(after, before, paired=paired),
+            "ratio": intervals.variance_ratio(after, before, paired=paired),
+            "share": intervals.share_shift(*shares, paired=paired),
         }
         for name, (_, lower, upper) in found.items():
             hits[name] += lower <= truths[name] <= upper
-        independent = two_samples.shift(*(Sample.of(x.values) for x in (after, before)), paired=False)
+        independent = intervals.shift(*(Sample.of(x.values) for x in (after, before)), paired=False)
         narrowest.append(np.ptp(found["shift"]) / np.ptp(independent))
     assert all(276 <= count <= 296 for count in hits.values()), hits
     assert np.median(narrowest) < (0.9 if plan == MONTE_CARLO else 0.6)

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from tests.test_contributions import of_clipped
-from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
+from tolcontact.statistics.variance_shares import missed, shapley_effects, sobol_indices
 
 
 def values(function, A, B):

@@ -7,7 +7,7 @@ import tolcontact as tc
 from models import hinge
 from tests.helpers import compiled
 from tolcontact.simulation import simulate_block
-from tolcontact.statistics.sobol_indices import sobol_indices
+from tolcontact.statistics.variance_shares import sobol_indices
 
 GROUPS = ("base.bore 1", "base.bore 2", "leaf.bore 1", "leaf.bore 2", "pin.barrel")
 ENDS = np.array([-hinge.WIDTH / 2, hinge.WIDTH / 2])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tolcontact.statistics.linear_shares import linear_shares, required_realizations
+from tolcontact.statistics.variance_shares import linear_shares, required_realizations
 
 SLOPES = np.array([3.0, 2.0, 1.0, 0.5, 0.0])
 SIZES = np.array([1.0, 20.0, 0.3, 4.0, 5.0])  # standard deviations, in any units

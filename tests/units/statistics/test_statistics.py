@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from tests import cases
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.discretization import discretize
-from tolcontact.statistics import DisplacementFields, intervals, two_samples
+from tolcontact.statistics import DisplacementFields, intervals
 from tolcontact.statistics.sample import Sample
 
 SAMPLES, REPEATS = 1000, 1000
@@ -86,9 +86,9 @@ DISTRIBUTIONS = {
 MOMENTS = {
     "mean": lambda x, y: intervals.mean(x), "variance": lambda x, y: intervals.variance(x),
     "skewness": lambda x, y: intervals.skewness(x), "kurtosis": lambda x, y: intervals.kurtosis(x),
-    "shift": lambda x, y: two_samples.shift(x, y, paired=False),
-    "ratio": lambda x, y: two_samples.variance_ratio(x, y, paired=False),
-    "paired ratio": lambda x, y: two_samples.variance_ratio(x, y, paired=True),
+    "shift": lambda x, y: intervals.shift(x, y, paired=False),
+    "ratio": lambda x, y: intervals.variance_ratio(x, y, paired=False),
+    "paired ratio": lambda x, y: intervals.variance_ratio(x, y, paired=True),
 }  # fmt: skip
 
 

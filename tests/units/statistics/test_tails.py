@@ -6,8 +6,7 @@ from scipy import stats
 
 from tests.helpers import nightly
 from tolcontact.statistics.intervals import Estimate
-from tolcontact.statistics.rare import Tail, either, sufficient_tail, tail_probability
-from tolcontact.statistics.rare.probability import unseen_share
+from tolcontact.statistics.rare import Tail, either, sufficient_tail, tail_probability, unseen_share
 
 TWELVE = np.ones(12) / np.sqrt(12)
 SLOPES = np.geomspace(0.1, 1.0, 20)

@@ -44,14 +44,6 @@ class SearchResult(NamedTuple):
     probability: Estimate
     points: list[np.ndarray]
 
-    @classmethod
-    def nothing(cls, product: "Product") -> "SearchResult":
-        """Return the result of a search that did not find the event, or that ended because it was negligible.
-
-        A level contains the event. An inflated event is assumed to be no less probable than the event itself.
-        """
-        return cls(Estimate(0.0, 0.0, product.estimate.upper if product.is_negligible else 1.0), [])
-
 
 class Product:
     """A product of means over strands, and its interval.
@@ -90,6 +82,14 @@ class Product:
         value = math.exp(self.log)
         return Estimate(value, value / reach, min(value * reach, 1.0))
 
+    @property
+    def of_nothing(self) -> SearchResult:
+        """The result of a search that did not find the event, or that ended because it was negligible.
+
+        A level contains the event. An inflated event is assumed to be no less probable than the event itself.
+        """
+        return SearchResult(Estimate(0.0, 0.0, self.estimate.upper if self.is_negligible else 1.0), [])
+
 
 class Walk:
     """Realizations of all strands that walk within events, simulated by `score`: `count` per strand at a level."""
@@ -111,11 +111,6 @@ class Walk:
         """Return the scores (strand, n) of realizations u (strand, n, d)."""
         self._simulated += u.shape[0] * u.shape[1]
         return self._score(u.reshape(-1, self.dimensions)).reshape(u.shape[:2])
-
-    def first_realizations(self, deviation: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return realizations of N(0, deviation^2) (strand, n, d), and their scores (strand, n)."""
-        u = deviation * self.rng.standard_normal((STRANDS, self.count, self.dimensions))
-        return u, self.scores(u)
 
     def seed_positions(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the positions of the seeds (strand, seed) of the next level among realizations with weights (strand, n).
@@ -155,7 +150,7 @@ def by_levels(walk: Walk) -> SearchResult:
     """Search by levels of the score."""
     product = Product()
     u = _levels(walk, 1.0, product)
-    return SearchResult.nothing(product) if u is None else SearchResult(product.estimate, u)
+    return product.of_nothing if u is None else SearchResult(product.estimate, u)
 
 
 def by_inflation(walk: Walk, inflation: float, budget: int) -> SearchResult:
@@ -190,7 +185,8 @@ def first_inflation(score: Score, dimensions: int, count: int, rng: np.random.Ge
 
 def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] | None:
     """Return realizations of N(0, inflation^2) of each strand in the event; None if it is not found, or negligible."""
-    u, g = walk.first_realizations(inflation)
+    u = inflation * walk.rng.standard_normal((STRANDS, walk.count, walk.dimensions))
+    g = walk.scores(u)
     for _ in range(MAX_LEVELS):
         threshold = _threshold(g)
         inside = g > threshold
@@ -222,7 +218,7 @@ def _weighted(walk: Walk, inflation: float) -> SearchResult:
     product, s = Product(), inflation
     u = _inflated(walk, inflation, product)
     if u is None:
-        return SearchResult.nothing(product)
+        return product.of_nothing
     while s > 1.0:
         squares = 0.5 * (u**2).sum(axis=-1)
 
@@ -235,7 +231,7 @@ def _weighted(walk: Walk, inflation: float) -> SearchResult:
         weights = np.exp(weights - largest)
         product.times(weights.mean(axis=1), log_scale=largest)
         if product.is_negligible:
-            return SearchResult.nothing(product)
+            return product.of_nothing
         seeds = u[walk.seed_positions(weights)]
         u, _ = walk.advance(seeds, np.ones(seeds.shape[:2]), 0.0, t)
         s = t
@@ -250,7 +246,7 @@ def _nested(walk: Walk, inflation: float, budget: int) -> SearchResult:
     product, s, pace = Product(), inflation, FIRST_PACE
     u = _inflated(walk, inflation, product)
     if u is None:
-        return SearchResult.nothing(product)
+        return product.of_nothing
     z, checked_points = u / inflation, u[:, :0]  # u (strand, n, d) to be checked for membership in the previous event
     while s > 1.0:
         for _ in range(TRIES):
@@ -259,7 +255,7 @@ def _nested(walk: Walk, inflation: float, budget: int) -> SearchResult:
             hits_before, hits = np.split(scores > 0, [checked_points.shape[1]], axis=1)
             product.over(hits_before)
             if product.is_negligible:
-                return SearchResult.nothing(product)
+                return product.of_nothing
             checked_points = checked_points[:, :0]
             share = float(hits.mean())
             change = math.log(GOAL) / math.log(min(max(share, 1 / hits.size), 1 - 1 / hits.size))
@@ -267,7 +263,7 @@ def _nested(walk: Walk, inflation: float, budget: int) -> SearchResult:
             if share >= MIN_GOAL:
                 break
         if not share:
-            return SearchResult.nothing(product)
+            return product.of_nothing
         product.times(hits.mean(axis=1))
         walk.spread(budget, nested_levels(t, math.exp(product.log)))
         seeds = z[walk.seed_positions(hits)]

@@ -1,4 +1,34 @@
-"""The probability of a rare event, from two searches and importance sampling around their results."""
+"""Probabilities of events that are too rare to be counted.
+
+A score g(u) of independent standard normal contributors u states whether a realization is in an event, g > 0, and for some
+events also how near it is otherwise. Two searches look for the regions of the event:
+
+by levels of the score (subset simulation; Au, Beck, 2001). The event is the last of nested events, g > c_1, g > c_2, ...,
+g > 0. Each is a fifth of the previous one, and
+
+    p = P(g > c_1) P(g > c_2 | g > c_1) ... P(g > 0 | g > c_last)
+
+by inflation. All contributors are inflated until the event is common, u ~ N(0, s^2), and brought back to s = 1. With few
+contributors realizations are weighted by the ratio of the densities, and resampled; with many the inflations are nested.
+
+Each search consists of eight strands that share levels or inflations. Their differences determine the accuracy of the product.
+
+The searches have different weaknesses: levels favour the region with the largest scores, and inflation favours distant regions.
+Realizations within the event walk by u' = sqrt(1 - b^2) u + b v, v standard normal, accepted if u' is in the event (Papaioannou
+and others, 2015). The results of both searches are the centres of a mixture of standard normals, which gives the probability by
+importance sampling. This estimate is unbiased for any centres, but a region that neither search found is missing from it. It is
+therefore used only if its weights are spread over many realizations, with no dominant one, and if neither search gives a
+significantly larger value. Where a region was reached by one or two strands only, there may be others, and the interval is
+widened (Good, 1953). Otherwise the result is the mean of the searches; where they disagree, the interval covers both, and
+`disagreement` states it.
+
+A search ends below 1e-9. The probability of the event is then reported as 0. Its upper bound is the probability of the last
+level, which contains the event, or of the inflated event, on the assumption that less inflation makes an event no more
+probable.
+
+With more than ten contributors, the means of contributors without influence are noise in a centre, which spreads the weights:
+entries of a centre below five standard errors are set to 0.
+"""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +39,7 @@ from scipy import cluster, special
 
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
-from tolcontact.statistics.rare.searches import (
+from tolcontact.statistics.rare_searches import (
     BEFORE_NESTED,
     MAX_WEIGHTED,
     MIN_LEVEL,
@@ -146,7 +176,7 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     is_small = samples < SEARCHABLE
     pilot = score(rng.standard_normal((max(int(PILOT * samples), MIN_PILOT), dimensions))) > 0
     if pilot.sum() >= (MIN_FEW if is_small else MIN_COUNTED):
-        return Tail(_counted(score, dimensions, samples - len(pilot), rng), 1.0)
+        return Tail(intervals.proportion(score(rng.standard_normal((samples - len(pilot), dimensions))) > 0), 1.0)
     budgets = [int(share * samples) for share in SEARCHES]
     searches = [_searched(score, dimensions, sum(budgets) if not leads else budgets[1], rng, inflates=True)]
     if leads:
@@ -156,7 +186,7 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     groups = [halves for search in searches if (halves := _halves(search.points))]
     if not groups:
         if all(estimate.upper == 1.0 for estimate in answers):
-            return Tail(_counted(score, dimensions, budget_drawn, rng), 1.0)
+            return Tail(intervals.proportion(score(rng.standard_normal((budget_drawn, dimensions))) > 0), 1.0)
         return _combined(answers)
     u, weights = _importance(score, dimensions, groups, budget_drawn, rng)
     if not _has_spread_weights(weights):
@@ -185,10 +215,6 @@ def either(tails: Sequence[Tail]) -> Tail:
     reach_below, reach_above = (math.sqrt(float(((estimates[:, k] - estimates[:, 0]) ** 2).sum())) for k in (1, 2))
     bounds = max(total - reach_below, 0.0), min(total + reach_above, 1.0)
     return Tail(Estimate(total, *bounds), max(tail.disagreement for tail in tails))
-
-
-def _counted(score: Score, dimensions: int, count: int, rng: np.random.Generator) -> Estimate:
-    return intervals.proportion(score(rng.standard_normal((count, dimensions))) > 0)
 
 
 def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generator, *, inflates: bool) -> SearchResult:

@@ -1,6 +1,7 @@
-"""Linear shares of variance: the contributors to the variance of a measurement, by regression on the draws of the run.
+"""Shares of variance that contributors cause: linear shares, Sobol' indices and Shapley effects.
 
-With deviations x (standardized), a measurement y and least squares y = b0 + b.x + e, the share of a group g of contributors is
+Linear shares come from regression on the draws of a run. With deviations x (standardized), a measurement y and least squares
+y = b0 + b.x + e, the share of a group g of contributors is
 
     S_g = cov(b_g . x_g, y) / var(y),     and they sum up to R^2 = 1 - var(e) / var(y).
 
@@ -14,6 +15,26 @@ The interval of a share is the interval of the mean of these influences or, if w
 between 0 and 1. Its bounds are apart by the largest influences more, since one more realization of that kind could have been
 drawn. A share has no interval if the variance of a contributor of its group comes from few realizations. The residuals of few
 realizations, or those with heavy tails, do not tell how much no line explains.
+
+A measure f of independent groups of contributors has the Sobol' indices
+
+    first order  S_i = Var(E[f | x_i]) / Var(f)          mean share that fixing the group would remove
+    total        T_i = E[Var(f | all but x_i)] / Var(f)  share that remains if all others are fixed
+
+With A and B two independent sets of draws, and A_i the set A with group i from B (Saltelli et al., 2010; Jansen, 1999)
+
+    S_i = mean(f(B) (f(A_i) - f(A))) / V,    T_i = mean((f(A) - f(A_i))^2) / 2 V,    V = mean(f(A)^2 + f(B)^2) / 2, f centred
+
+For correlated groups neither index is a share. Shapley effects are: each is the variance that a group adds to the variance
+explained by the previous groups, averaged over all orders (Owen, 2014; Song, Nelson, Staum, 2016). They add up to 1. If f_m is
+a realization that has the groups of A at the first m positions of a random order, with the others redrawn conditional on these,
+the group at position m has
+
+    Sh = mean((f(A) - f_m)^2 - (f(A) - f_{m+1})^2) / mean((f(A) - f_0)^2)
+
+Each is a ratio of means over independent base realizations, so its interval is Student's t interval of its influence function,
+with the effective degrees of freedom of the spread of the influences. The variance of a measure that contact nearly always
+holds at a stop comes from few realizations: from fewer than 100, an index has no interval.
 """
 
 import math
@@ -23,8 +44,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from tolcontact.statistics import intervals
-from tolcontact.statistics.intervals import Estimate
+from tolcontact.statistics.intervals import UNDEFINED, Estimate, effective_count, from_influences
 
 MIN_ROWS, ROWS_PER_CONTRIBUTOR = 200, 5  # fewer realizations give no shares
 MIN_RESIDUALS, MAX_KURTOSIS = 1000, 10.0  # realizations, and the kurtosis of their residuals: otherwise R^2 has no interval
@@ -32,6 +52,8 @@ MIN_EFFECTIVE = 20  # effective realizations behind the variance of a contributo
 MAX_LEVERAGE = 0.9  # of a realization in its own fit
 MIN_SHARE = 1e-6  # on the logit scale
 MIN_R2 = 0.5  # below this, linear shares do not describe a measurement
+MIN_DECISIVE = 100  # effective realizations behind the variance of a measure: with fewer, an index has no interval
+CONSTANT = 1e-24  # of the square of the mean: a smaller variance is rounding
 
 
 class LinearShares(NamedTuple):
@@ -83,7 +105,7 @@ def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) ->
     columns, rows = np.concatenate(members), np.repeat(np.arange(len(members)), [len(group) for group in members])
     membership = scipy.sparse.csr_array((np.ones(len(columns)), (rows, columns)), shape=(len(members), count))
     sizes = membership.sum(axis=1)
-    is_rare = membership @ np.array([intervals.effective_count(column**2) < MIN_EFFECTIVE for column in x.T]) > 0
+    is_rare = membership @ np.array([effective_count(column**2) < MIN_EFFECTIVE for column in x.T]) > 0
     shares: list[LinearShares | None] = []
     for values in y.T:
         centred = values - values.mean()
@@ -109,9 +131,53 @@ def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) ->
 def _with_interval(share: float, influences: np.ndarray) -> Estimate:
     """Return a share, with the interval that the influences of realizations (n,) give it."""
     influences = influences - influences.mean()
-    _, lower, upper = intervals.from_influences(0.0, influences)
+    _, lower, upper = from_influences(0.0, influences)
     lower, upper = lower + influences.min() / len(influences), upper + influences.max() / len(influences)
     error = min(max(upper, -lower, MIN_SHARE), 0.5)  # nearer to 0 or 1 than by its error, the logit scale has no meaning
     inner = min(max(share, error), 1 - error)
     least, most = scipy.special.expit(scipy.special.logit(inner) + np.array([lower, upper]) / (inner * (1 - inner)))
     return Estimate(float(share), float(min(share + lower, least)), float(max(min(share + upper, 1.0), most, share)))
+
+
+def sobol_indices(f: np.ndarray, accuracy: float = 0.0) -> tuple[list[Estimate], list[Estimate]]:
+    """Return first-order and total indices of each group, for values f (n, 2 + group) of A, B, and A with each group from B.
+
+    A measure whose spread is below its accuracy has no indices.
+    """
+    mean = f[:, :2].mean()
+    A, B, mixed = f[:, 0] - mean, f[:, 1] - mean, f[:, 2:] - mean
+    v = (A**2 + B**2) / 2
+    if not _varies(f, v, mean, accuracy):
+        return [UNDEFINED] * mixed.shape[1], [UNDEFINED] * mixed.shape[1]
+    first_order, total = B[:, None] * (mixed - A[:, None]), (A[:, None] - mixed) ** 2 / 2
+    return [_ratio(u, v) for u in first_order.T], [_ratio(u, v) for u in total.T]
+
+
+def shapley_effects(f: np.ndarray, positions: np.ndarray, accuracy: float = 0.0) -> list[Estimate]:
+    """Return each group's Shapley effect, from f (n, 1 + group) with 0, 1, ... groups of A, at `positions` (n, group)."""
+    remaining = (f[:, -1:] - f) ** 2
+    if not _varies(f, remaining[:, 0], f.mean(), accuracy):
+        return [UNDEFINED] * positions.shape[1]
+    reductions = np.take_along_axis(remaining[:, :-1] - remaining[:, 1:], positions, axis=1)
+    return [_ratio(u, remaining[:, 0]) for u in reductions.T]
+
+
+def missed(f: np.ndarray, linear: np.ndarray, accuracy: float = 0.0) -> Estimate:
+    """Return the share of the variance of f (n,) that a prediction (n,) misses; it exceeds 1 if the mean predicts better."""
+    mean, errors = f.mean(), f - linear
+    f = f - mean
+    return _ratio((errors - errors.mean()) ** 2, f**2) if _varies(f, f**2, mean, accuracy) else UNDEFINED
+
+
+def _varies(f: np.ndarray, squares: np.ndarray, mean: float, accuracy: float) -> bool:
+    """Return whether values are finite, and their variance, the mean of `squares`, is more than rounding and accuracy."""
+    return bool(np.isfinite(f).all() and squares.mean() > max(CONSTANT * mean**2, accuracy**2))
+
+
+def _ratio(u: np.ndarray, v: np.ndarray) -> Estimate:
+    """Return the mean of u over the mean of v, of the same realizations, with the interval of its influence function."""
+    mean_v = v.mean()
+    estimate = float(u.mean() / mean_v)
+    if effective_count(v) < MIN_DECISIVE:
+        return Estimate(estimate, math.nan, math.nan)
+    return from_influences(estimate, (u - estimate * v) / mean_v)

@@ -1,9 +1,15 @@
-"""The same realizations with rigid parts in place of elastic ones: what elasticity adds to the variance of a run."""
+"""What a report asks of the model of a run, rebuilt from its archive.
+
+With too few realizations for shares: the variance that each contributor causes to first order, without contact. With elastic
+parts: the same realizations with rigid ones, for what elasticity adds to the variance of a run.
+"""
 
 from typing import NamedTuple
 
+import numpy as np
 import xarray as xr
 
+from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.archive import method_of_run, model_of
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import compile_program
@@ -12,9 +18,22 @@ from tolcontact.discretization import discretize
 from tolcontact.realizations import finished
 from tolcontact.simulation import simulate_block
 from tolcontact.vocabulary import CORRECTED, DEVIATION, MEASURED, RAW
+from tolcontact.workflow.models import DEFAULT_SOLVER, method_of
 
 MAX_ROWS = 1000
 SOLVER = "graph"
+
+
+def first_order_variances(results: xr.DataTree) -> np.ndarray:
+    """Return the variance (measure, contributor) of each measure of a run by its nominal derivatives; NaN at a kink.
+
+    Contributors have the variance of their own distributions. Raises ModelError or ArchiveError if the model cannot be rebuilt.
+    """
+    assembly = model_of(results)
+    choice = method_of(assembly, None)
+    program = compile_program(discretize(assembly, presses=choice.minimizes.presses), DEFAULT_SOLVER, choice)
+    variances = np.array([contributor.variance for contributor in program.draws.contributors])
+    return total_derivatives(program) ** 2 * variances
 
 
 class RigidValues(NamedTuple):
