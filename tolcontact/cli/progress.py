@@ -14,7 +14,7 @@ from rich.table import Column
 
 from tolcontact import interrupts
 from tolcontact.cli.app import echo
-from tolcontact.report.figures import grouped
+from tolcontact.report.table import grouped
 from tolcontact.texts import shown
 from tolcontact.workflow.forecast import duration
 

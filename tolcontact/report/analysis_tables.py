@@ -1,8 +1,8 @@
 """Tables of analyses, the same for the terminal and the page; one function per analysis makes them from its dataset."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -11,34 +11,16 @@ from rich.text import Text
 
 from tolcontact import vocabulary as terms
 from tolcontact.limits import GAP_ACCURACY
-from tolcontact.report.figures import grouped, number, percent, share
-from tolcontact.report.stack_tables import stack_up_report
-from tolcontact.report.sweep_tables import sweep_report
-from tolcontact.report.table import Table
+from tolcontact.report import stack_tables
+from tolcontact.report.stack_tables import lost_realizations, unresolved
+from tolcontact.report.table import AnalysisReport, Table, grouped, number, percent
 
+BRIEF_TABLES, BRIEF_ROWS = 10, 4  # of a coarse answer in brief: the first tables, and the rows of each that a line has
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are only counted
-AT_END = 1.001  # times the smallest factor of a tolerance: below this, it is as small as permitted
 MAX_HOLDERS = 3  # of a part, in a table
 FEW_NAMES = 3  # of features in a note
 FEW_SEARCHES = 0.25  # of all: if no more than this share end at a value, a remark states that there may be worse ones
-
-
-@dataclass(frozen=True)
-class AnalysisReport:
-    """The report of an analysis for readers.
-
-    name     prefix of the titles of its tables on a page
-    count    the simulated realizations, in words
-    notes    lines that explain the tables
-    main     the most important column of the tables
-    """
-
-    name: str
-    count: str
-    notes: Sequence[str]
-    tables: Sequence[Table]
-    main: int = 1
 
 
 def analysis_report(record: terms.AnalysisRecord, dataset: xr.Dataset) -> AnalysisReport:
@@ -57,20 +39,22 @@ def analysis_text(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Group:
     return Group(title, *map(Text, report.notes), *report.tables)
 
 
-def _lost(count: int) -> list[str]:
-    return [f"{grouped(count)} realizations were not resolved; their last poses are included"] if count else []
-
-
-def _unresolved(dataset: xr.Dataset) -> int:
-    return int(dataset["by_status"].values[list(terms.UNRESOLVED)].sum())
-
-
-def _ppm(values: np.ndarray, *, sign: bool = False) -> str:
-    return number(1e6 * np.asarray(values), sign=sign, max_decimals=0).replace(" [", " ppm [")
+def brief_lines(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Iterator[str]:
+    """Yield a coarse answer in brief: what it rests on, and the first rows of its first tables."""
+    report = analysis_report(record, dataset)
+    yield f"{report.name.lower()} {dataset.attrs[terms.COARSE]}"
+    tables = [table for table in report.tables if len(table.columns) > report.main and (table.title or len(report.tables) == 1)]
+    for table in tables[:BRIEF_TABLES]:
+        rows = [[cell for cell in (row[0], row[report.main], *row[1:]) if cell != "-"][:2] for row in table.rows[:BRIEF_ROWS]]
+        known = "; ".join(" ".join(row) for row in rows if len(row) > 1)
+        yield f"  {table.title}: " * bool(table.title) + (known or "not known yet")
 
 
 def _contributions(dataset: xr.Dataset) -> AnalysisReport:
-    notes = ["Shares of variance: alone, and in total, together with others; 95 % intervals.", *_lost(_unresolved(dataset))]
+    notes = [
+        "Shares of variance: alone, and in total, together with others; 95 % intervals.",
+        *lost_realizations(unresolved(dataset)),
+    ]
     tables = [table for measure in dataset["measure"].values for table in _shares(dataset.sel(measure=measure))]
     return AnalysisReport("Contributions", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables, main=3)
 
@@ -133,7 +117,7 @@ def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
         "Mean derivatives with 95 % intervals: over realizations without contact, and",
         "over realizations with contact, both without kinks and jumps;",
         '"all" includes kinks and jumps, and "kinks" is their share.',
-        *_lost(_unresolved(dataset)),
+        *lost_realizations(unresolved(dataset)),
     ]
     tables = [_slopes(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
     leverage = dataset["leverage"].values
@@ -239,78 +223,6 @@ def _tails(dataset: xr.Dataset) -> AnalysisReport:
     return AnalysisReport("Rare events", count, notes, [Table("", ["", "ppm"], rows)])
 
 
-def _allocation(dataset: xr.Dataset) -> AnalysisReport:
-    requirements = []
-    for name, values in zip(dataset["requirement"].values, dataset["kept"].values, strict=True):
-        requirements.append([str(name), *map(share if f": {terms.PPM}" in str(name) else number, values)])
-    ranges = []
-    for group in dataset["group"].values:
-        row = dataset.sel(group=group)
-        widths = [f"{width:.4g}" if math.isfinite(width) else "several" for width in row["range"].values]
-        ranges.append([str(group), *widths, f"{float(row['factor']):.3g}", _remark_on(row, dataset.attrs)])
-    before, after = dataset["cost"].sum("group").values
-    tables = [
-        Table("", ["required", *terms.STAGES], requirements),
-        Table(f"Cost {before:.4g} before, {after:.4g} after", ["tolerance", *terms.STAGES, "factor", ""], ranges),
-        *(_effects(dataset["effect"].sel(measure=measure)) for measure in dataset["measure"].values),
-    ]
-    notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals."]
-    least, most = (f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling"))
-    notes.append(f"Tolerances may be {least} (smallest allowed) to {most} (largest allowed) those before.\n")
-    if choices := dataset.attrs.get("choices"):
-        notes.append(f"Choices: {choices}.\n")
-    if dataset["idle"].values.any():
-        count = dataset.attrs["idle_tried"]
-        notes.append(
-            f"No influence: with all of these tolerances together at {least} or {most} those before, none of {grouped(count)} "
-            f"resolved realizations changed. So at most {3 / count:.2g} of them do, with 95 % confidence.\n"
-        )
-    for (name, _, after), is_met in zip(requirements, dataset["met"].values, strict=True):
-        if not is_met:
-            notes.append(f'"{name}": no tolerances were found whose 95 % interval keeps it; the best: {after}.\n')
-    return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
-
-
-def _remark_on(row: xr.Dataset, attributes: dict) -> str:
-    """Return why a tolerance did not change further, if there is a reason."""
-    if int(row["idle"]):
-        return "no influence"
-    factor = float(row["factor"])
-    at_floor, at_ceiling = factor <= attributes["floor"] * AT_END, factor * AT_END >= attributes["ceiling"]
-    return "smallest allowed" if at_floor else "largest allowed" if at_ceiling else ""
-
-
-def _effects(effect: xr.DataArray) -> Table:
-    """Return the effects (of_effect, group, interval) on a measure, starting with the largest one."""
-    rows = []
-    for k in np.argsort(effect.values[0, :, 0], kind="stable"):
-        spread, outside = effect.values[:, k]
-        rows.append([str(effect["group"].values[k]), number(spread, sign=True), _ppm(outside, sign=True)])
-    title = f"{effect['measure'].values} [{effect['measure_units'].values}]: changes if zones were a tenth narrower than before"
-    return Table(title, ["", *terms.EFFECTS], rows)
-
-
-def _relocation(dataset: xr.Dataset) -> AnalysisReport:
-    statistic = dataset.attrs["least"]
-    is_share = statistic.endswith(terms.PPM)
-    text = share if is_share else number
-    rows = []
-    for stage, point, reached in zip(terms.STAGES, dataset["point"].values, dataset["reached"].values, strict=True):
-        rows.append([f"{stage}: ({', '.join(f'{c:.4g}' for c in point)})", text(reached)])
-    change = dataset["change"].values
-    rows.append(["after minus before", _ppm(change, sign=True)] if is_share else ["after / before", number(change)])
-    columns = [dataset.attrs["locator"], statistic if is_share else f"{statistic} [{dataset['measure_units'].values}]"]
-    samples, fresh = (grouped(dataset.attrs[word]) for word in ("samples", "fresh"))
-    notes = [
-        f"{samples} realizations for each trial position;",
-        f"{fresh} fresh ones for the figures below, with 95 % intervals.\n",
-    ]
-    before, after = dataset["point"].values
-    stays = ["No position between the corners is better: the locator stays where it is.\n"] * bool((before == after).all())
-    table = Table("", columns, rows, _lost(int(dataset["unresolved"].max())))
-    return AnalysisReport("Position of a locator", f"{grouped(dataset.sizes['trial'])} trial positions", notes + stays, [table])
-
-
 def _seating(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
         "Least coefficient of friction, the same at all other contacts, that can hold",
@@ -337,13 +249,13 @@ def _seat(dataset: xr.Dataset) -> list[str]:
 
 
 _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
-    terms.STACK_UP.name: lambda dataset: AnalysisReport(*stack_up_report(dataset, _lost(_unresolved(dataset)))),
+    terms.STACK_UP.name: stack_tables.stack_up_report,
     terms.CONTRIBUTIONS.name: _contributions,
     terms.SENSITIVITIES.name: _sensitivities,
     terms.WORST_CASE.name: _worst_case,
     terms.TAILS.name: _tails,
-    terms.ALLOCATION.name: _allocation,
-    terms.RELOCATION.name: _relocation,
+    terms.ALLOCATION.name: stack_tables.allocation_report,
+    terms.RELOCATION.name: stack_tables.relocation_report,
     terms.SEATING.name: _seating,
-    terms.SWEEP.name: lambda dataset: AnalysisReport(*sweep_report(dataset, _lost(_unresolved(dataset.sum("position"))))),
+    terms.SWEEP.name: stack_tables.sweep_report,
 }

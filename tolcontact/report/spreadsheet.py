@@ -87,17 +87,7 @@ def _document(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> 
 def _results(summary: xr.Dataset) -> Table:
     heads = [f"{name}{end}" for name in (*STATISTICS[:3], "share below limit", "share above limit") for end in INTERVAL]
     rows = [
-        [
-            row.name,
-            row.units,
-            row.quantity,
-            row.verdict,
-            row.nominal,
-            row.lower,
-            row.upper,
-            figures.state,
-            *figures.values.ravel(),
-        ]
+        [*row[:4], row.nominal, row.lower, row.upper, figures.state, *figures.values.ravel()]
         for row in result_rows(summary)
         for figures in row.states
     ]
@@ -124,18 +114,17 @@ def _contributors(results: xr.DataTree, summary: xr.Dataset) -> Table:
         rows += [[str(name), group, *(100 * values)] for group, values in zip(shares.groups, shares.shares, strict=True)] or [
             [str(name), shares.note, None, None, None]
         ]
-    return Table(
-        terms.CONTRIBUTORS, [terms.MEASUREMENT, "contributor", *(f"share of variance{end}, %" for end in INTERVAL)], rows
-    )
+    heads = [f"share of variance{end}, %" for end in INTERVAL]
+    return Table(terms.CONTRIBUTORS, [terms.MEASUREMENT, "contributor", *heads], rows)
 
 
 def _contact(summary: xr.Dataset) -> Table:
-    heading = terms.reaction_words(summary["reaction"].attrs["units"]).heading.replace("\n", " ")
+    reaction = terms.reaction_words(summary["reaction"].attrs["units"]).heading
+    heads = [f"{heading}{end}".replace("\n", " ") for heading in (terms.IN_CONTACT, reaction) for end in INTERVAL]
     rows = []
     for pair in summary["pair"].values:
         of_pair = summary.sel(pair=pair)
         rows.append([str(pair), *of_pair["carried"].values, *of_pair["reaction"].sel(of_reaction=terms.MEAN).values])
-    heads = [f"{terms.IN_CONTACT.replace(chr(10), ' ')}{end}" for end in INTERVAL] + [f"{heading}{end}" for end in INTERVAL]
     return Table("Contact", ["contact pair", *heads], rows)
 
 

@@ -6,8 +6,8 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.report.figures import nominal_and_limits, plain
 from tolcontact.report.results_table import result_rows, share_heading, share_in, share_units, verdict_lines, verdict_text
+from tolcontact.report.table import nominal_and_limits, plain
 from tolcontact.statistics import intervals
 from tolcontact.statistics.capability import ALLOWED_SHARE, FAILS, MEETS, UNDECIDED, verdict
 
