@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive import settings
-from tolcontact.archive.contact_values import contact_values, face_numbers
+from tolcontact.archive.contact_values import Values, contact_values, face_numbers
 from tolcontact.archive.settings import Run, elastic_parts, stiffness_hash
 from tolcontact.archive.variables import Row, define, kept_rows, labels_of_rows, units_of_rows
 from tolcontact.compilation import Program
@@ -71,7 +71,9 @@ def _entries(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequence[i
     variations = locator_variations(program)[nominal.last_indices]
     yield file, {terms.SUMMED_ROWS: 0, terms.LOCATOR_VARIATION: variations, **_measure_values(program)}
     yield from _model(file.createGroup("model"), program)
-    yield file.createGroup("contact"), contact_values(program) | _empty_touching(nominal)
+    points = sum(len(pair.P_m) for pair in nominal.pairs)
+    shares = np.full(points, np.nan), np.full((points, 2), np.nan), 0  # of touching, before any are known
+    yield file.createGroup("contact"), contact_values(program) | dict(zip(terms.TOUCHING, shares, strict=True))
     yield from _sample(file.createGroup("sample"), program, rows)
     if len(nominal.loads):
         yield from _elastic(file.createGroup(terms.ELASTIC_GROUP), program, rows)
@@ -86,14 +88,12 @@ def _entries(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequence[i
 
 def _stations(file: netCDF4.Dataset, nominal: Nominal, rows: Sequence[Row]) -> Entries:
     """Yield the station of each measure, pair and part, and what each station has for realizations."""
-    yield (
-        file,
-        {
-            terms.MEASURE_STATION: [measure.station for measure in nominal.measures],
-            terms.PAIR_STATION: [nominal.parts[pair.moving].station for pair in nominal.pairs],
-            terms.PART_STATION: [part.station for part in nominal.last_parts],
-        },
-    )
+    values: Values = {
+        terms.MEASURE_STATION: [measure.station for measure in nominal.measures],
+        terms.PAIR_STATION: [nominal.parts[pair.moving].station for pair in nominal.pairs],
+        terms.PART_STATION: [part.station for part in nominal.last_parts],
+    }
+    yield file, values
     for scene in nominal.scenes:
         path = terms.station_group(scene.station)
         group = file.createGroup(path)
@@ -102,7 +102,7 @@ def _stations(file: netCDF4.Dataset, nominal: Nominal, rows: Sequence[Row]) -> E
         yield group, {terms.STATION_PART_LABEL: parts, **{row.variable: None for row in rows if row.group == path}}
 
 
-def _measure_values(program: Program) -> dict[ArchiveVariable, Any]:
+def _measure_values(program: Program) -> Values:
     measures = program.nominal.measures
     bounds = np.array([m.bounds(nominal) for m, nominal in zip(measures, program.nominal_measures, strict=True)])
     bounds = np.where(np.isfinite(bounds), bounds, np.nan).reshape(-1, 2)
@@ -131,7 +131,7 @@ def _model(group: netCDF4.Group, program: Program) -> Entries:
             yield mesh, _mesh_values(part)
 
 
-def _mesh_values(part: NominalPart) -> dict[ArchiveVariable, Any]:
+def _mesh_values(part: NominalPart) -> Values:
     values = {terms.MESH_VERTICES: part.mesh.vertices, terms.MESH_FACES: part.mesh.faces}
     if COORDINATE_SPACING in part.mesh.metadata:
         values[terms.COORDINATE_SPACING] = coordinate_spacing(part.mesh)
@@ -144,44 +144,31 @@ def _mesh_values(part: NominalPart) -> dict[ArchiveVariable, Any]:
     return values
 
 
-def _empty_touching(nominal: Nominal) -> dict[ArchiveVariable, Any]:
-    points = sum(len(pair.P_m) for pair in nominal.pairs)
-    return {
-        terms.TOUCHING_SHARE: np.full(points, np.nan),
-        terms.TOUCHING_INTERVAL: np.full((points, 2), np.nan),
-        terms.TOUCHING_REALIZATIONS: 0,
-    }
-
-
 def _sample(group: netCDF4.Group, program: Program, rows: Sequence[Row]) -> Entries:
     contributors, locators = program.draws.contributors, program.nominal.locators
     group.createDimension(terms.CONTRIBUTOR, len(contributors))
     group.createDimension(terms.LOCATOR, len(locators))
     yield group, {row.variable: None for row in rows if row.variable is terms.DEVIATION}
-    yield (
-        group,
-        {
-            terms.CONTRIBUTOR_LABEL: [contributor.label for contributor in contributors],
-            terms.CONTRIBUTOR_SOURCE: [contributor.source for contributor in contributors],
-            terms.CONTRIBUTOR_UNITS: [contributor.units for contributor in contributors],
-            terms.TOLERANCE_RANGE: [contributor.range for contributor in contributors],
-            terms.DISTRIBUTION: [contributor.description for contributor in contributors],
-            terms.MEAN_SHIFT: [contributor.mean_shift for contributor in contributors],
-        },
-    )
+    values: Values = {
+        terms.CONTRIBUTOR_LABEL: [contributor.label for contributor in contributors],
+        terms.CONTRIBUTOR_SOURCE: [contributor.source for contributor in contributors],
+        terms.CONTRIBUTOR_UNITS: [contributor.units for contributor in contributors],
+        terms.TOLERANCE_RANGE: [contributor.range for contributor in contributors],
+        terms.DISTRIBUTION: [contributor.description for contributor in contributors],
+        terms.MEAN_SHIFT: [contributor.mean_shift for contributor in contributors],
+    }
+    yield group, values
     if any(parts := [contributor.parts for contributor in contributors]):
         yield group, {terms.PARTS: parts}
-    yield (
-        group,
-        {
-            terms.LOCATOR_LABEL: locators.labels,
-            terms.STIFFNESS: locators.stiffness,
-            terms.ONE_SIDED: locators.one_sided,
-            terms.LOCATOR_POINT: locators.points,
-            terms.LOCATOR_DIRECTION: locators.directions,
-            terms.FACE_OF_LOCATOR: face_numbers(program.nominal, locators.faces),
-        },
-    )
+    values = {
+        terms.LOCATOR_LABEL: locators.labels,
+        terms.STIFFNESS: locators.stiffness,
+        terms.ONE_SIDED: locators.one_sided,
+        terms.LOCATOR_POINT: locators.points,
+        terms.LOCATOR_DIRECTION: locators.directions,
+        terms.FACE_OF_LOCATOR: face_numbers(program.nominal, locators.faces),
+    }
+    yield group, values
     if any(locators.grounds):
         yield group, {terms.GROUND_OF_LOCATOR: face_numbers(program.nominal, locators.grounds)}
 
@@ -201,21 +188,19 @@ def _elastic(group: netCDF4.Group, program: Program, rows: Sequence[Row]) -> Ent
             C[np.ix_(at, at)], opening[at] = flexibility.C[np.ix_(load_rows, load_rows)], flexibility.opening[load_rows]
     by_load, by_forces = _measured(program)
     parts = elastic_parts(nominal)
-    yield (
-        group,
-        {
-            terms.POINT_OF_LOAD: starts[pairs] + points,
-            terms.WELD_OF_LOAD: [_weld_row(nominal, k, point) for k, point in nominal.loads.tolist()],
-            terms.HOLDS: [nominal.pairs[k].holds for k in pairs],
-            terms.FLEXIBILITY: C,
-            terms.OPENING: opening,
-            terms.MEASURED_BY_LOAD: by_load.T,
-            terms.MEASURED_BY_FORCES: by_forces,
-            terms.ELASTIC_LABEL: [part.name for part in parts],
-            terms.ELASTIC_SOURCE: [str(part.part.elasticity) for part in parts],
-            terms.ELASTIC_HASH: [stiffness_hash(part) for part in parts],
-        },
-    )
+    values: Values = {
+        terms.POINT_OF_LOAD: starts[pairs] + points,
+        terms.WELD_OF_LOAD: [_weld_row(nominal, k, point) for k, point in nominal.loads.tolist()],
+        terms.HOLDS: [nominal.pairs[k].holds for k in pairs],
+        terms.FLEXIBILITY: C,
+        terms.OPENING: opening,
+        terms.MEASURED_BY_LOAD: by_load.T,
+        terms.MEASURED_BY_FORCES: by_forces,
+        terms.ELASTIC_LABEL: [part.name for part in parts],
+        terms.ELASTIC_SOURCE: [str(part.part.elasticity) for part in parts],
+        terms.ELASTIC_HASH: [stiffness_hash(part) for part in parts],
+    }
+    yield group, values
 
 
 def _weld_row(nominal: Nominal, pair: int, point: int) -> int:
@@ -245,7 +230,7 @@ def empty_checks(count: int, pairs: int) -> dict[ArchiveVariable, np.ndarray]:
     }
 
 
-def _field_values(part: NominalPart, numbers: int) -> dict[ArchiveVariable, Any]:
+def _field_values(part: NominalPart, numbers: int) -> Values:
     """Return the surface of a part, and its displacement field and sums before they are known."""
     states, vertices = len(terms.STATES), len(part.vertices)
     empty = np.full([states, vertices, len(terms.COMPONENTS)], np.nan)

@@ -96,7 +96,7 @@ def _mesh(mesh: xr.Dataset) -> Any:
     arrays = {name: mesh[variable.name].values for name, variable in terms.OF_BREP_FACE.items()}
     kinds, names = arrays["kind"], mesh.get(terms.NAME_OF_BREP_FACE.name, ())
     sound = all(np.isfinite(values).all() for values in arrays.values())
-    sound = sound and np.isin(kinds, range(-1, len(terms.SURFACE_KINDS))).all()
+    sound = sound and bool(np.isin(kinds, range(-1, len(terms.SURFACE_KINDS))).all())
     if not sound or (len(brep) and not 0 <= brep.min() <= brep.max() < len(kinds)):
         raise ArchiveError("the surfaces of a mesh in the archive are damaged")
     return with_known_surfaces(vertices, faces, brep, surfaces_of(arrays), tuple(str(name) for name in np.asarray(names)))

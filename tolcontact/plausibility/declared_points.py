@@ -211,13 +211,13 @@ def _declared_points(draws: TrialDraws) -> "defaultdict[Part, list[DeclaredPoint
             name = f'locator "{locator.name}"'
             point = DeclaredPoint(f"{location_designation(model, nominal)}: {name}", f"its {name}", np.array(locator.point))
             points[locator.part or nominal.part].append(point)
-    declared = [
-        (measure, f'measurement "{measure.name}"', point) for measure in model.assembly.measures for point in measure.points
-    ]
-    declared += [(force, f'force "{force.name}"', force.at) for force in model.assembly.forces]
-    for owner, name, point in declared:
-        if point.position is not None:
-            points[point.part].append(DeclaredPoint(owner.designation, f"the point of {name}", np.array(point.position)))
+    for owner, phrase, declared in (
+        *((measure, f'measurement "{measure.name}"', point) for measure in model.assembly.measures for point in measure.points),
+        *((force, f'force "{force.name}"', force.at) for force in model.assembly.forces),
+    ):
+        if declared.position is not None:
+            place = DeclaredPoint(owner.designation, f"the point of {phrase}", np.array(declared.position))
+            points[declared.part].append(place)
     return points
 
 

@@ -13,7 +13,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.limits import GAP_ACCURACY
 from tolcontact.report import stack_tables
 from tolcontact.report.stack_tables import lost_realizations, unresolved
-from tolcontact.report.table import AnalysisReport, Table, grouped, number, percent
+from tolcontact.report.table import AnalysisReport, Table, by_measure, grouped, number, percent
 
 BRIEF_TABLES, BRIEF_ROWS = 10, 4  # of a coarse answer in brief: the first tables, and the rows of each that a line has
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
@@ -55,7 +55,7 @@ def _contributions(dataset: xr.Dataset) -> AnalysisReport:
         "Shares of variance: alone, and in total, together with others; 95 % intervals.",
         *lost_realizations(unresolved(dataset)),
     ]
-    tables = [table for measure in dataset["measure"].values for table in _shares(dataset.sel(measure=measure))]
+    tables = [table for measure in by_measure(dataset) for table in _shares(measure)]
     return AnalysisReport("Contributions", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables, main=3)
 
 
@@ -73,13 +73,9 @@ def _shares(dataset: xr.Dataset) -> Iterator[Table]:
             continue
         shares = dataset.isel(group=group)
         # Without contact, measures are nearly additive: first-order and total shares hardly differ.
-        cells = [
-            _share(shares["total"].isel(state=terms.RAW)),
-            _share(shares["first"].isel(state=terms.CORRECTED)),
-            _share(shares["total"].isel(state=terms.CORRECTED)),
-        ]
-        linear = float(shares["linear"])
-        rows.append([str(shares["group"].values), *cells, f"{100 * linear:.1f} %" if math.isfinite(linear) else "-"])
+        cells = shares["total"][terms.RAW], shares["first"][terms.CORRECTED], shares["total"][terms.CORRECTED]
+        linear = f"{100 * float(shares['linear']):.1f} %" if math.isfinite(shares["linear"]) else "-"
+        rows.append([str(shares["group"].values), *map(_share, cells), linear])
     if not np.isfinite(dataset["linear"].values).any():
         missed.append("no linear shares: it has a kink in the assembly as drawn, or no slope there")
     small = dataset.sizes["group"] - len(rows)
@@ -92,12 +88,11 @@ def _shares(dataset: xr.Dataset) -> Iterator[Table]:
         yield Table(measure, columns, rows, [*remarks, *missed], is_detail=True)
         return
     yield Table(measure, columns, rows, remarks, is_detail=True)
-    effects = dataset["shapley"].sel(interval="estimate")
-    rows = [
-        [str(dataset["unit"].values[k]), *(_share(dataset["shapley"].sel(state=s).isel(unit=k)) for s in terms.STATES)]
-        for k in _by_size(dataset["shapley"])
-        if not abs(float(effects.isel(unit=k).max())) < SMALL_SHARE
-    ]
+    rows = []
+    for k in _by_size(dataset["shapley"]):
+        effects = dataset["shapley"].isel(unit=k)
+        if not abs(float(effects.sel(interval="estimate").max())) < SMALL_SHARE:
+            rows.append([str(dataset["unit"].values[k]), *map(_share, effects)])
     title = f"{measure}: Shapley effects, which divide what is correlated"
     yield Table(title, ["", *terms.STATE_WORDS], rows, missed, is_detail=True)
 
@@ -119,7 +114,7 @@ def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
         '"all" includes kinks and jumps, and "kinks" is their share.',
         *lost_realizations(unresolved(dataset)),
     ]
-    tables = [_slopes(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
+    tables = [_slopes(measure) for measure in by_measure(dataset)]
     leverage = dataset["leverage"].values
     order = [k for k in np.argsort(-leverage, kind="stable") if np.isfinite(leverage[k])]
     if order:
@@ -140,12 +135,11 @@ def _slopes(dataset: xr.Dataset) -> Table:
         if not size[k] > SMALL_SLOPE * np.nanmax(size):
             continue
         slopes = dataset.isel(contributor=int(k))
-        by_contact = [number(slopes["by_contact"].sel(contact=contact).values) for contact in terms.CONTACT_STATES]
-        corrected = number(slopes["sensitivity"].isel(state=terms.CORRECTED).values)
-        spread, slope = f"{float(slopes['spread'][terms.CORRECTED]):.2g}", float(slopes["nominal"])
-        nominal = f"{slope:.3g}" if math.isfinite(slope) else "kink"
-        kinks = percent(slopes["changing"].values)
-        rows.append([str(slopes["contributor"].values), nominal, *by_contact, corrected, spread, kinks])
+        means = [slopes["by_contact"].sel(contact=contact).values for contact in terms.CONTACT_STATES]
+        means.append(slopes["sensitivity"].isel(state=terms.CORRECTED).values)
+        nominal = f"{float(slopes['nominal']):.3g}" if math.isfinite(slopes["nominal"]) else "kink"
+        spread, kinks = f"{float(slopes['spread'][terms.CORRECTED]):.2g}", percent(slopes["changing"].values)
+        rows.append([str(slopes["contributor"].values), nominal, *map(number, means), spread, kinks])
     small = dataset.sizes["contributor"] - len(rows)
     title = f"{dataset['measure'].values} ({dataset['measure_units'].values} for a unit of each)"
     columns = ["", "nominal", "apart", "touching", "all", "spread", "kinks"]
@@ -170,7 +164,7 @@ def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
             notes.append(f"{grouped(int(counts[status]))} combinations are {meaning}; they do not count")
     if counts[terms.Status.NOT_ASSEMBLABLE]:
         notes.append("So the drawings allow parts that do not go together.")
-    tables = [table for measure in dataset["measure"].values for table in _extremes(dataset.sel(measure=measure))]
+    tables = [table for measure in by_measure(dataset) for table in _extremes(measure)]
     return AnalysisReport("Worst cases", f"{grouped(int(counts.sum()))} combinations", notes, tables)
 
 
@@ -180,9 +174,8 @@ def _extremes(dataset: xr.Dataset) -> Iterator[Table]:
     for state in terms.STATES:
         for end, word in terms.WORD_OF_END.items():
             extreme = dataset.sel(state=state, end=end)
-            found, linear = float(extreme["worst"]), float(extreme["bound"])
-            cells = [f"{found:.6g}", f"{linear:.6g}" if math.isfinite(linear) else "no limit"]
-            cells.append(f"{int(extreme['agreeing'])} of {searches}")
+            linear = f"{float(extreme['bound']):.6g}" if math.isfinite(extreme["bound"]) else "no limit"
+            cells = [f"{float(extreme['worst']):.6g}", linear, f"{int(extreme['agreeing'])} of {searches}"]
             rows.append([f"{word}, {terms.WORD_OF_STATE[state]}", *cells])
     remarks = []
     beyond = float((np.array(terms.SENSES) * (dataset["worst"] - dataset["bound"]).values).max())
@@ -232,20 +225,17 @@ def _seating(dataset: xr.Dataset) -> AnalysisReport:
     ]
     if dataset.attrs["open_pairs"]:
         notes.append(f"They do not touch there, so they hold nothing: {dataset.attrs['open_pairs']}.")
-    rows = [_seat(dataset.isel(seat=k)) for k in range(dataset.sizes["seat"])]
+    rows = []
+    for seat in range(dataset.sizes["seat"]):
+        critical, reserve, shares = (dataset[name].values[seat] for name in ("critical", "reserve", "share"))
+        holders = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SMALL_SHARE and critical > 0]
+        names = [f"{dataset['holder'].values[k]} {100 * shares[k]:.0f} %" for k in holders[:MAX_HOLDERS]]
+        names += [f"and {len(holders) - MAX_HOLDERS} more"] if len(holders) > MAX_HOLDERS else []
+        warning = ", may stop short" if 0 < critical and reserve <= 1 else ""
+        factor = "-" if np.isnan(reserve) else f"{float(reserve):.3g}{warning}"
+        rows.append([str(dataset["seat"].values[seat]), f"{float(critical):.4g}", factor, ",\n".join(names)])
     columns = ["", "critical", "reserve", "held by"]
     return AnalysisReport("Seating", f"{len(rows)} seats", notes, [Table("", columns, rows)])
-
-
-def _seat(dataset: xr.Dataset) -> list[str]:
-    """Return the row of a seat, starting with the contacts that have the largest shares."""
-    critical, reserve, shares = (dataset[name].values for name in ("critical", "reserve", "share"))
-    holders = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SMALL_SHARE and critical > 0]
-    names = [f"{dataset['holder'].values[k]} {100 * shares[k]:.0f} %" for k in holders[:MAX_HOLDERS]]
-    names += [f"and {len(holders) - MAX_HOLDERS} more"] if len(holders) > MAX_HOLDERS else []
-    warning = ", may stop short" if 0 < critical and reserve <= 1 else ""
-    factor = "-" if np.isnan(reserve) else f"{float(reserve):.3g}{warning}"
-    return [str(dataset["seat"].values), f"{float(critical):.4g}", factor, ",\n".join(names)]
 
 
 _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {

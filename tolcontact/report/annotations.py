@@ -51,8 +51,16 @@ def marks_of(results: xr.DataTree) -> Marks:
         measures = list(_measures(document, results["model"].to_dataset()))
     except (LookupError, TypeError, ValueError, RuntimeError) as error:  # no run wrote it: its checksum was forged
         raise ArchiveError(f"the declared model in the archive is damaged: {type(error).__name__}: {error}") from error
+    contacts: list[Mark] = []
+    if terms.MOVING_POINT.name in contact:
+        places, pairs = contact[terms.MOVING_POINT.name].values, contact[terms.PAIR_OF_POINT.name].values
+        names = zip(results.to_dataset()[terms.PAIR].values, contact[terms.MOVING_PART.name].values.tolist(), strict=True)
+        contacts = [
+            {"name": str(name), "part": moving, "points": places[pairs == k], "gaps": None}
+            for k, (name, moving) in enumerate(names)
+        ]
     locators = _named(sample[terms.LOCATOR].values, at=points, along=directions)
-    return Marks(locators, list(_contacts(results)), measures, features, forces)
+    return Marks(locators, contacts, measures, features, forces)
 
 
 def marks_of_nominal(nominal: Nominal) -> Marks:
@@ -85,16 +93,6 @@ def _named(names: Iterable[str], **arrays: Iterable[np.ndarray]) -> list[Mark]:
 def fixed_points(pair: ContactPoints) -> tuple[np.ndarray, np.ndarray]:
     """Return contact points (point, 3) and gaps (point,) [mm], except on nearest tangents of hollow walls, which move."""
     return pair.P_m[pair.stays], pair.nominal_gaps(pose.AT_REST[None])[0, pair.stays]
-
-
-def _contacts(results: xr.DataTree) -> Iterator[Mark]:
-    contact = results["contact"].to_dataset()
-    if terms.MOVING_POINT.name not in contact:
-        return
-    points, pair_of_point = contact[terms.MOVING_POINT.name].values, contact[terms.PAIR_OF_POINT.name].values
-    for number, name in enumerate(results.to_dataset()[terms.PAIR].values):
-        moving = int(contact[terms.MOVING_PART.name].values[number])
-        yield {"name": str(name), "part": moving, "points": points[pair_of_point == number], "gaps": None}
 
 
 def _measures(document: Mark, model: xr.Dataset) -> Iterator[Mark]:

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.contributor_shares import ContributorShares
-from tolcontact.report.table import Table, grouped, number, percent, settled
+from tolcontact.report.table import Table, by_measure, grouped, number, percent, settled
 from tolcontact.texts import clipped
 
 VALUES = ("", "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN)
@@ -29,9 +29,8 @@ _DRAWS = {
 def runs_text(comparison: xr.Dataset) -> Group:
     """Return a comparison (see compare_runs) for rich to print."""
     sections: list[Text | Table] = [Text(comparison.attrs["title"], style="bold"), *map(Text, runs_lines(comparison))]
-    for name in comparison["measure"].values:
-        measure = comparison.sel(measure=name)
-        sections.append(Text(f"\n{name} ({measure['measure_units'].values})", style="bold"))
+    for measure in by_measure(comparison):
+        sections.append(Text(f"\n{measure['measure'].values} ({measure['measure_units'].values})", style="bold"))
         sections += [value_table(measure), Text(f"\nchanges from {comparison.attrs['reference_run']}"), change_table(measure)]
     return Group(*sections)
 

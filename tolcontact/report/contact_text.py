@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.report.table import Table, grouped, number, percent, settled
+from tolcontact.report.table import Table, by_measure, grouped, number, percent, settled
 from tolcontact.statistics.convention import ACCURACY
 
 RAW, CORRECTED = terms.STATES
@@ -31,7 +31,7 @@ def convention_lines(summary: xr.Dataset) -> Iterator[str]:
     counts = summary["compared_by_objective"].values
     if not summary.sizes[terms.BY_OBJECTIVE] or not counts.any():
         return
-    lines = [line for name in summary[terms.MEASURE].values for line in _other_results(summary.sel(measure=name))]
+    lines = [line for measure in by_measure(summary) for line in _other_results(measure)]
     compared = f"on {counts[counts > 0].min()} of the same draws"
     if not lines:
         others = [f'"{name}"' for name in summary[terms.BY_OBJECTIVE].values]

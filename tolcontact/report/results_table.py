@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.contact_text import unexplained_offsets
-from tolcontact.report.table import Table, grouped, limits_text, nominal_and_limits, number, percent
+from tolcontact.report.table import Table, by_measure, grouped, limits_text, nominal_and_limits, number, percent
 from tolcontact.statistics.capability import CONSTANT, FAILS, KEPT, UNDECIDED, Verdict, verdict
 
 PPM_BELOW = 0.01  # if all shares are smaller, the table states them in ppm
@@ -23,19 +23,11 @@ COLUMNS = (
 SIDES = ("below", "above")
 
 
-class StateFigures(NamedTuple):
-    """The figures of a measurement in one state, as (estimate, lower, upper) of `STATISTICS`, and as texts."""
-
-    state: str
-    values: np.ndarray
-    cells: list[str]
-
-
 class ResultRow(NamedTuple):
     """The rows of the table for a measurement.
 
     verdict   "" without limits
-    states    with contact first
+    states    with contact first: the state in words, figures (estimate, lower, upper) of `STATISTICS`, and their texts, `cells`
     """
 
     name: str
@@ -47,7 +39,7 @@ class ResultRow(NamedTuple):
     lower: float
     upper: float
     limits: tuple[str, str, str]
-    states: list[StateFigures]
+    states: list[dict[str, Any]]
 
 
 def share_units(summary: xr.Dataset) -> str:
@@ -74,11 +66,11 @@ def share_heading(summary: xr.Dataset) -> str:
 def result_rows(summary: xr.Dataset) -> list[ResultRow]:
     """Return the rows of the table for each measurement."""
     doubts, is_reserved, rows = doubts_of_all(summary), bool(reservation(summary)), []
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
+    for measure in by_measure(summary):
         opinion, kept = verdict_of(measure, summary.attrs["realizations"]), _kept(measure)
         is_open = opinion is None or opinion.word in (UNDECIDED, CONSTANT) or bool(kept) or is_reserved
-        limits = [float(measure[label].values) for label in (terms.MEASURE_NOMINAL.name, *terms.MEASURE_LIMITS[:2])]
+        labels = (terms.MEASURE_NOMINAL.name, *terms.MEASURE_LIMITS[:2])
+        nominal, lower, upper = (float(measure[label].values) for label in labels)
         rows.append(
             ResultRow(
                 full_name(measure),
@@ -86,18 +78,20 @@ def result_rows(summary: xr.Dataset) -> list[ResultRow]:
                 str(measure["measure_quantity"].values),
                 f"{verdict_text(opinion)}{kept}{doubts}" if opinion else "",
                 None if is_open or opinion is None else opinion.word != FAILS,
-                *limits,
-                nominal_and_limits(*limits),
+                nominal,
+                lower,
+                upper,
+                nominal_and_limits(nominal, lower, upper),
                 [_state_figures(measure.sel(state=state), share_units(summary)) for state in reversed(terms.STATES)],
             )
         )
     return rows
 
 
-def _state_figures(of_state: xr.Dataset, units: str) -> StateFigures:
+def _state_figures(of_state: xr.Dataset, units: str) -> dict[str, Any]:
     values = of_state["statistic_value"].sel(statistic=list(STATISTICS)).transpose("statistic", "interval").values
-    below, above = (share_in(share, units) for share in values[3:])
-    return StateFigures(terms.WORD_OF_STATE[str(of_state["state"].values)], values, [*map(number, values[:3]), below, above])
+    cells = [*map(number, values[:3]), *(share_in(share, units) for share in values[3:])]
+    return {"state": terms.WORD_OF_STATE[str(of_state["state"].values)], "figures": values, "cells": cells}
 
 
 def verdict_of(measure: xr.Dataset, realizations: int) -> Verdict | None:
@@ -157,8 +151,7 @@ def verdict_lines(summary: xr.Dataset, *, states_once: bool = False) -> Iterator
     What makes all verdicts doubtful follows each of them, or is stated once, in the last line.
     """
     doubts = doubts_of_all(summary)
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
+    for measure in by_measure(summary):
         if share := int(measure[terms.NOT_A_NUMBER].values) / summary.attrs["realizations"]:
             # A share in percent with two digits, never rounded to 0 or to all.
             rounded = f"{100 * share:.2g} %" if share < 0.995 else "100 %" if share == 1 else "more than 99 %"
@@ -184,8 +177,7 @@ def overview_table(summary: xr.Dataset, *, is_long: bool = False) -> Table:
     In a long summary it only has figures with contact.
     """
     rows, units = [], share_units(summary)
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
+    for measure in by_measure(summary):
         if not is_long:
             rows.append([full_name(measure), "", "", "", ""])
         values = measure["statistic_value"].sel(statistic=[terms.MEAN, terms.SIX_SIGMA, terms.PPK, terms.OUTSIDE])

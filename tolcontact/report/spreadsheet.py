@@ -18,7 +18,7 @@ from tolcontact.replacing import replacing
 from tolcontact.report.contributor_shares import contributor_shares
 from tolcontact.report.model_tables import archived_settings, model_tables
 from tolcontact.report.results_table import STATISTICS, result_rows
-from tolcontact.report.table import Table
+from tolcontact.report.table import Table, by_measure
 from tolcontact.statistics.capability import VERDICT_RULE
 from tolcontact.texts import sheet_cell
 from tolcontact.vocabulary import units_of
@@ -87,9 +87,9 @@ def _document(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> 
 def _results(summary: xr.Dataset) -> Table:
     heads = [f"{name}{end}" for name in (*STATISTICS[:3], "share below limit", "share above limit") for end in INTERVAL]
     rows = [
-        [*row[:4], row.nominal, row.lower, row.upper, figures.state, *figures.values.ravel()]
+        [*row[:4], row.nominal, row.lower, row.upper, state["state"], *state["figures"].ravel()]
         for row in result_rows(summary)
-        for figures in row.states
+        for state in row.states
     ]
     labels = [terms.MEASUREMENT, "units", "quantity", "verdict", "nominal", "lower limit", "upper limit", "contact"]
     return Table("Results", [*labels, *heads], rows)
@@ -97,14 +97,13 @@ def _results(summary: xr.Dataset) -> Table:
 
 def _statistics(summary: xr.Dataset) -> Table:
     rows = []
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
-        units = str(measure["measure_units"].values)
+    for measure in by_measure(summary):
+        name, units = str(measure["measure"].values), str(measure["measure_units"].values)
         for state in terms.STATES:
             for statistic in summary["statistic"].values:
                 values = measure["statistic_value"].sel(state=state, statistic=statistic).values
                 if np.isfinite(values[0]):
-                    rows.append([str(name), terms.WORD_OF_STATE[state], str(statistic), units_of(statistic, units), *values])
+                    rows.append([name, terms.WORD_OF_STATE[state], str(statistic), units_of(statistic, units), *values])
     return Table("Statistics", [terms.MEASUREMENT, "contact", "statistic", "units", *terms.ESTIMATE], rows)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.report.table import AnalysisReport, Table, grouped, number, percent, share
+from tolcontact.report.table import AnalysisReport, Table, by_measure, grouped, number, percent, share
 from tolcontact.statistics.capability import MIN_TAIL
 
 AT_END = 1.001  # times the smallest factor of a tolerance: below this, it is as small as permitted
@@ -35,7 +35,7 @@ def unresolved(dataset: xr.Dataset) -> int:
 def stack_up_report(dataset: xr.Dataset) -> AnalysisReport:
     """Return worst case, RSS, inflated RSS and simulated range of each measurement."""
     count = f"{grouped(dataset.attrs['realizations'])} realizations"
-    tables = [_table(dataset.sel(measure=name)) for name in dataset["measure"].values]
+    tables = [_table(measure) for measure in by_measure(dataset)]
     return AnalysisReport("Stack-up", count, [*NOTES, *lost_realizations(unresolved(dataset))], tables)
 
 
@@ -66,11 +66,11 @@ def _remarks(dataset: xr.Dataset, centred: float, rss: float) -> Iterator[str]:
         yield f"RSS has {int(dataset['forms'])} forms of faces with 3 sigma; worst case and MRSS have no figure for them."
     if lots := float(dataset.get("lots", 0.0)):  # archives of earlier versions have none
         yield f"Lots with their means on either side shift the mean by up to ±{lots:.4g}, if all are on the worse one."
-    states = dict(terms.WORD_OF_STATE)
-    if _is_without_contact(dataset):
-        states.pop(terms.STATES[0])
-    for state, word in states.items():
-        where = f", {word}" if len(states) > 1 else ""
+    is_without_contact = _is_without_contact(dataset)
+    for state, word in terms.WORD_OF_STATE.items():
+        if is_without_contact and state == terms.STATES[0]:
+            continue
+        where = "" if is_without_contact else f", {word}"
         if not np.isfinite(dataset["simulated"].sel(state=state)).all():
             yield f"RSS{where} is not judged: {MIN_TAIL} realizations bound the range, give --samples {MIN_TAIL} or more."
             continue
@@ -97,7 +97,7 @@ def sweep_report(dataset: xr.Dataset) -> AnalysisReport:
         "What lies between two positions is not seen.",
         *lost_realizations(unresolved(dataset.sum("position"))),
     ]
-    rows = [row for name in dataset["measure"].values for row in _rows(dataset.sel(measure=name))]
+    rows = [row for measure in by_measure(dataset) for row in _rows(measure)]
     heading = ["", "mean", "6 sigma", "outer\npercentile", "mostly at"]
     envelope = Table("", heading, rows, ["outer percentile: 0.135 % of the least values, 99.865 % of the largest"])
     count = f"{grouped(dataset.attrs['realizations'])} realizations at {dataset.sizes['position']} positions"
@@ -144,7 +144,14 @@ def allocation_report(dataset: xr.Dataset) -> AnalysisReport:
     for group in dataset["group"].values:
         row = dataset.sel(group=group)
         widths = [f"{width:.4g}" if math.isfinite(width) else "several" for width in row["range"].values]
-        ranges.append([str(group), *widths, f"{float(row['factor']):.3g}", _remark_on(row, dataset.attrs)])
+        factor = float(row["factor"])
+        if int(row["idle"]):
+            remark = "no influence"
+        elif factor <= dataset.attrs["floor"] * AT_END:
+            remark = "smallest allowed"
+        else:
+            remark = "largest allowed" if factor * AT_END >= dataset.attrs["ceiling"] else ""
+        ranges.append([str(group), *widths, f"{factor:.3g}", remark])
     before, after = dataset["cost"].sum("group").values
     tables = [
         Table("", ["required", *terms.STAGES], requirements),
@@ -166,15 +173,6 @@ def allocation_report(dataset: xr.Dataset) -> AnalysisReport:
         if not is_met:
             notes.append(f'"{name}": no tolerances were found whose 95 % interval keeps it; the best: {after}.\n')
     return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
-
-
-def _remark_on(row: xr.Dataset, attributes: dict) -> str:
-    """Return why a tolerance did not change further, if there is a reason."""
-    if int(row["idle"]):
-        return "no influence"
-    factor = float(row["factor"])
-    at_floor, at_ceiling = factor <= attributes["floor"] * AT_END, factor * AT_END >= attributes["ceiling"]
-    return "smallest allowed" if at_floor else "largest allowed" if at_ceiling else ""
 
 
 def _effects(effect: xr.DataArray) -> Table:

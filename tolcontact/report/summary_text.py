@@ -14,7 +14,7 @@ from scipy import special
 from tolcontact import vocabulary as terms
 from tolcontact.report.contact_text import CORRECTED, RAW, contact_lines, offset_table, pair_table
 from tolcontact.report.results_table import full_name, overview_table, verdict_lines, verdict_of
-from tolcontact.report.table import NO_INTERVAL, Table, grouped, limits_text, number, percent, share
+from tolcontact.report.table import NO_INTERVAL, Table, by_measure, grouped, limits_text, number, percent, share
 from tolcontact.statistics.capability import CONSTANT, FAILS, MEETS, MIN_TAIL, MIN_TAILS, UNDECIDED
 from tolcontact.statistics.intervals import CONFIDENCE, MAX_KURTOSIS, MIN_SHAPE, MIN_VARIANCE
 from tolcontact.statistics.sample import MIN_APART
@@ -59,7 +59,7 @@ def _sections(summary: xr.Dataset, *, is_whole: bool) -> Iterator[Text | Table |
     has_details = is_whole or (summary.sizes["measure"] <= MOST_DETAILED and not is_long)
     yield from map(Text, verdict_lines(brief, states_once=not has_details))
     if has_details:
-        yield from (measure_table(summary.sel(measure=name), summary.sizes["measure"]) for name in summary["measure"].values)
+        yield from (measure_table(measure, summary.sizes["measure"]) for measure in by_measure(summary))
     elif remark or not is_long:
         yield Text(remark or f"percentiles and capability of each: {EVERYTHING}")
     if not summary.sizes["part"]:
@@ -92,7 +92,7 @@ def _brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
     count = summary.sizes[terms.MEASURE]
     if count <= MOST_LISTED:
         return summary, ""
-    measures = [summary.isel(measure=index) for index in range(count)]
+    measures = by_measure(summary)
     opinions = [verdict_of(measure, summary.attrs["realizations"]) for measure in measures]
     verdicts = [
         FAILS if int(measure[terms.NOT_A_NUMBER].values) else "" if opinion is None else opinion.word
@@ -138,9 +138,8 @@ def capability_text(summary: xr.Dataset) -> Group:
     sections: list[Text | Table] = [
         Text(f"{summary.attrs['title']}: {summary.attrs['realizations']} realizations", style="bold")
     ]
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
-        title = f"{name} ({measure['measure_units'].values}): {limits_text(measure) or 'no limits'}"
+    for measure in by_measure(summary):
+        title = f"{measure['measure'].values} ({measure['measure_units'].values}): {limits_text(measure) or 'no limits'}"
         if limits_text(measure):
             table = measure_table(measure.sel(statistic=[*terms.SHARES, *terms.CAPABILITY]), summary.sizes["measure"])
             sections.append(replace(table, title=title, columns=table.columns[:-1], rows=[row[:-1] for row in table.rows]))

@@ -45,11 +45,6 @@ class Table:
         return [["" if cell is None else plain(cell) if isinstance(cell, float) else cell for cell in row] for row in self.rows]
 
     @property
-    def names(self) -> list[str]:
-        """The first cell of each row."""
-        return [row[0] for row in self.texts]
-
-    @property
     def is_number(self) -> list[bool]:
         """Whether each column has numbers."""
         return [any(isinstance(row[k], float) for row in self.rows) for k in range(len(self.columns))]
@@ -85,19 +80,14 @@ class Table:
         """Return rows with intervals split at their comma, from the widest column on, until they fit: no column may be cut."""
         widths = self._widths(rows)
         for k in sorted(range(1, len(widths)), key=lambda k: -widths[k]):
-            if self._width(rows) <= width:
-                break
-            rows = [
-                [cell.replace(", ", ",\n ") if j == k and "\n[" in cell else cell for j, cell in enumerate(row)] for row in rows
-            ]
+            if self._width(rows) > width:
+                rows = [[*row[:k], row[k].replace(", ", ",\n ") if "\n[" in row[k] else row[k], *row[k + 1 :]] for row in rows]
         return rows
 
     def _widths(self, rows: Sequence[Sequence[str]]) -> list[int]:
         """Return the width of each column, for cells of several lines."""
-        return [
-            max(cell_len(line) for cell in cells for line in cell.split("\n"))
-            for cells in zip(self.columns, *rows, strict=True)
-        ]
+        columns = zip(self.columns, *rows, strict=True)
+        return [max(cell_len(line) for cell in cells for line in cell.split("\n")) for cells in columns]
 
     def _width(self, rows: Sequence[Sequence[str]]) -> int:
         return sum(self._widths(rows)) + BETWEEN * (len(self.columns) - 1)
@@ -118,6 +108,11 @@ class AnalysisReport:
     notes: Sequence[str]
     tables: Sequence[Table]
     main: int = 1
+
+
+def by_measure(dataset: xr.Dataset) -> list[xr.Dataset]:
+    """Return the part of a dataset for each measure."""
+    return [dataset.sel(measure=name) for name in dataset["measure"].values]
 
 
 def grouped(count: int) -> str:

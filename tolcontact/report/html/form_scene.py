@@ -1,7 +1,6 @@
 """Single realizations in the scene of an archive: form deviation, remaining gaps at contact points, and poses in stations."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -20,22 +19,6 @@ FLATNESS = 1e-6  # of the size of a face: tolerance for vertices and normals of 
 NEAR = 1.0  # correlation lengths: a vertex of the plane that is further from all stations belongs to another face
 HOLE = 3.0  # times the usual edge length between neighbouring contact points: a triangle with a longer edge is a hole
 Scene = dict[str, Any]
-
-
-@dataclass(frozen=True, eq=False)
-class ShownForm:
-    """The form deviation of a face at vertices of the drawn surface of its part.
-
-    vertices       (k,) their indices
-    normal         (3,) outward
-    modes          (k, mode) heights for unit coefficients
-    coefficients   (realization, mode) [mm]
-    """
-
-    vertices: np.ndarray
-    normal: np.ndarray
-    modes: np.ndarray
-    coefficients: np.ndarray
 
 
 class SingleStates:
@@ -67,14 +50,20 @@ class SingleStates:
         is_kept = terms.DEVIATION.name in self._results["sample"] and terms.ROTATION.name in self._results
         return is_kept and terms.FACE_OF_MOVING.name in self._contact and terms.MOVING_POINT.name in self._contact
 
-    def forms(self, part: str, vertices: np.ndarray, faces: np.ndarray) -> Iterator[ShownForm]:
-        """Yield the forms of a part with vertices (vertex, 3) [mm] and triangles (face, 3)."""
+    def forms(self, part: str, vertices: np.ndarray, faces: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+        """Yield the forms of a part with vertices (vertex, 3) [mm] and triangles (face, 3), at vertices of its drawn surface.
+
+        vertices       (k,) their indices
+        normal         (3,) outward
+        modes          (k, mode) heights for unit coefficients
+        coefficients   (realization, mode) [mm]
+        """
         for face, covariance in enumerate(self._contact.get(terms.FORM_COVARIANCE.name, []) if self.are_known else []):
             is_plane = terms.SURFACE_KINDS[int(self._contact[terms.FORM_SURFACE["kind"].name][face])] == "plane"
             if covariance and is_plane and str(self._contact[terms.FEATURE_OF_FACE.name][face]).startswith(f"{part}."):
                 yield from self._shown(face, vertices, faces)
 
-    def _shown(self, face: int, vertices: np.ndarray, faces: np.ndarray) -> Iterator[ShownForm]:
+    def _shown(self, face: int, vertices: np.ndarray, faces: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         """Yield a form at the vertices in the plane of its stations, if triangles show it."""
         stations = self._contact[terms.FORM_STATION_PLACE.name][self._contact[terms.FACE_OF_FORM_STATION.name] == face]
         centre, size = stations.mean(axis=0), np.ptp(vertices, axis=0).max()
@@ -85,8 +74,12 @@ class SingleStates:
         corners = vertices[faces[is_shown[faces].all(axis=1)]]
         if len(corners):
             outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
-            numbers, coefficients = np.flatnonzero(is_shown), self._deviations[:, self._columns(face)]
-            yield ShownForm(numbers, outward / np.linalg.norm(outward), self._modes(face, vertices[numbers]), coefficients)
+            yield {
+                "vertices": np.flatnonzero(is_shown),
+                "normal": outward / np.linalg.norm(outward),
+                "modes": self._modes(face, vertices[is_shown]),
+                "coefficients": self._deviations[:, self._columns(face)],
+            }
 
     def _columns(self, face: int) -> np.ndarray:
         """Return the contributors (mode,) that are the coefficients of a form."""

@@ -30,7 +30,7 @@ from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.model_tables import archived_settings, chains_of, dimensions_of, model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
 from tolcontact.report.summary_text import measure_table
-from tolcontact.report.table import Table, grouped, limits_text
+from tolcontact.report.table import Table, by_measure, grouped, limits_text
 from tolcontact.statistics.capability import VERDICT_RULE
 
 HERE = Path(__file__).parent
@@ -161,11 +161,11 @@ def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
     documents = {name: declaration_of(results) for name, results in runs.items()}
     positions = {name: results.to_dataset()[terms.MEASURE].values.tolist() for name, results in runs.items()}
     shares = {name: contributor_shares(results, finished(results)) for name, results in runs.items()}
-    for name in comparison["measure"].values:
-        measure = comparison.sel(measure=name)
+    for measure in by_measure(comparison):
+        name = str(measure["measure"].values)
         contributors = contributor_table({run: shares[run][names.index(name)] for run, names in positions.items()})
         tables = [value_table(measure), change_table(measure), *([contributors] if contributors.rows else [])]
-        measures.append({"name": str(name), "units": str(measure["measure_units"].values), "tables": tables})
+        measures.append({"name": name, "units": str(measure["measure_units"].values), "tables": tables})
     values = {
         "title": comparison.attrs["title"],
         "reference": comparison.attrs["reference_run"],
@@ -229,11 +229,11 @@ def _results(summary: xr.Dataset) -> dict[str, Any]:
 def _details(summary: xr.Dataset, shares: Sequence[ContributorShares]) -> list[dict[str, Any]]:
     """Return the details of each measurement: limits, contributors, and all estimates as rows of texts."""
     details = []
-    for name, contributors in zip(summary["measure"].values, shares, strict=True):
-        measure = summary.sel(measure=name)
-        units, table = str(measure["measure_units"].values), measure_table(measure, summary.sizes["measure"])
+    for measure, contributors in zip(by_measure(summary), shares, strict=True):
+        name, units = (str(measure[label].values) for label in ("measure", "measure_units"))
+        table = measure_table(measure, summary.sizes["measure"])
         figures = {"limits": limits_text(measure), "rows": table.rows, "note": "; ".join(table.remarks)}
-        details.append({"name": str(name), "units": units, "contributors": contributors, **figures})
+        details.append({"name": name, "units": units, "contributors": contributors, **figures})
     return details
 
 
@@ -252,7 +252,7 @@ def _missing(scene: dict[str, Any]) -> list[str]:
 def contributions_of(results: xr.DataTree) -> list[dict[str, Any]]:
     """Return total and first-order shares of each measure's groups, in both states, the largest total share first."""
     dataset = archived_analysis(results, terms.CONTRIBUTIONS)
-    return [] if dataset is None else [_shares(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
+    return [] if dataset is None else list(map(_shares, by_measure(dataset)))
 
 
 def tables_of(results: xr.DataTree) -> Iterator[Table]:

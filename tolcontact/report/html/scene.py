@@ -117,8 +117,8 @@ def _parts(results: xr.DataTree, states: SingleStates) -> list[Scene]:
         vertices, faces, nearest = coarser(field[terms.FIELD_VERTICES.name].values, triangles, count)
         part: Scene = {"name": name, "vertices": packed(vertices), "faces": packed(faces, "i4"), "triangles": len(triangles)}
         part["forms"] = [
-            {"vertices": packed(form.vertices, "i4"), "normal": form.normal.tolist(), "modes": packed(form.modes),
-             "coefficients": packed(form.coefficients)}
+            {"vertices": packed(form["vertices"], "i4"), "normal": form["normal"].tolist(), "modes": packed(form["modes"]),
+             "coefficients": packed(form["coefficients"])}
             for form in states.forms(name, vertices, faces)
         ]  # fmt: skip
         for key, variable in (("mean", terms.FIELD_MEAN), ("sixSigma", terms.FIELD_SIX_SIGMA)):
