@@ -37,7 +37,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # Packages and modules that get no faults, by name: they do not compute results. All others are tested.
 SPARED = {"declaration", "vocabulary", "workflow", "report", "plot", "cli", "testing"}
 SPARED |= {"method", "errors", "child", "compiled", "readable", "version", "__main__", "__init__"}
-SPARED |= {"quiet", "inspection", "archive_lock", "reader"}
+SPARED |= {"quiet", "inspection", "reader"}
 WEIGHTS = {"contact": 4, "compilation": 3, "statistics": 3, "archive": 3, "simulation": 2, "mechanics": 2}  # others 1
 PATIENCE, TIMES = 40.0, 10.0  # s, and multiple of its usual time: then a test is stopped, and the fault counts as found
 OUTCOMES = ("found", "timeout", "survived", "not reached", "not run")

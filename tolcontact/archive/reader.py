@@ -1,4 +1,4 @@
-"""Reading an archive with xarray, and rebuilding its model."""
+"""Reading an archive with xarray, checking its realizations, and rebuilding its model."""
 
 import contextlib
 from collections.abc import Iterator
@@ -21,6 +21,8 @@ from tolcontact.geometry import surfaces_of, with_known_surfaces
 from tolcontact.method import Method
 from tolcontact.realizations import declaration_of
 from tolcontact.system import files
+
+PIECE_BYTES = 1 << 22  # of a variable that are read at once
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
@@ -86,16 +88,36 @@ def _mesh(mesh: xr.Dataset) -> Any:
     """Return the mesh of a part, with the surfaces of its B-rep faces if there are any."""
     vertices, faces = mesh[terms.MESH_VERTICES.name].values, mesh[terms.MESH_FACES.name].values
     if any(variable.name not in mesh for variable in terms.KNOWN_SURFACES):
-        stated = terms.COORDINATE_SPACING.name
-        spacing = mesh[stated].values if stated in mesh else np.zeros(3)
-        return SimpleNamespace(vertices=vertices, faces=faces, coordinate_spacing=spacing)
+        stated = mesh.get(terms.COORDINATE_SPACING.name)
+        return SimpleNamespace(
+            vertices=vertices, faces=faces, coordinate_spacing=np.zeros(3) if stated is None else stated.values
+        )
     brep = mesh[terms.BREP_OF_FACE.name].values
     arrays = {name: mesh[variable.name].values for name, variable in terms.OF_BREP_FACE.items()}
-    kinds = arrays["kind"]
+    kinds, names = arrays["kind"], mesh.get(terms.NAME_OF_BREP_FACE.name, ())
     sound = all(np.isfinite(values).all() for values in arrays.values())
-    sound = sound and bool((kinds >= -1).all()) and bool((kinds < len(terms.SURFACE_KINDS)).all())
+    sound = sound and bool(np.isin(kinds, range(-1, len(terms.SURFACE_KINDS))).all())
     if not sound or (len(brep) and not 0 <= brep.min() <= brep.max() < len(kinds)):
         raise ArchiveError("the surfaces of a mesh in the archive are damaged")
-    named = terms.NAME_OF_BREP_FACE.name
-    names = tuple(map(str, mesh[named].values)) if named in mesh else ()
-    return with_known_surfaces(vertices, faces, brep, surfaces_of(arrays), names)
+    return with_known_surfaces(vertices, faces, brep, surfaces_of(arrays), tuple(str(name) for name in np.asarray(names)))
+
+
+def check_rows(results: xr.DataTree) -> None:
+    """Raise ArchiveError if realizations are not what was written: the library compares the checksums of what it reads."""
+    for group in results.subtree:
+        for name, values in group.to_dataset(inherit=False).data_vars.items():
+            if terms.REALIZATION in values.dims:
+                _check_variable(str(name), values)
+
+
+def _check_variable(name: str, values: xr.DataArray) -> None:
+    row_bytes = values.dtype.itemsize * max(values.size // max(len(values), 1), 1)
+    step = max(PIECE_BYTES // row_bytes // terms.BLOCK_ROWS, 1) * terms.BLOCK_ROWS
+    for start in range(0, len(values), step):
+        try:
+            values[start : start + step].load()
+        except (OSError, RuntimeError) as error:
+            raise ArchiveError(
+                f'the archive is damaged: "{name}" of realizations {start} to {min(start + step, len(values)) - 1} '
+                f"is not what was written ({error}); run it again"
+            ) from error

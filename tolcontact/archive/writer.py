@@ -1,7 +1,6 @@
 """Writing an archive: its header first, its realizations block by block to a journal, and all of them at the end."""
 
 import contextlib
-import json
 import os
 import shutil
 import time
@@ -12,79 +11,20 @@ from typing import TYPE_CHECKING, Any
 import netCDF4
 import numpy as np
 
-from tolcontact import vocabulary as terms
-from tolcontact.archive.archive_lock import locked_archive
-from tolcontact.archive.elastic_values import changed_body
-from tolcontact.archive.header import contact_values, write_header
+from tolcontact import poses as pose, vocabulary as terms
+from tolcontact.archive.header import empty_checks, write_header
 from tolcontact.archive.inspection import check_archive, inspect
-from tolcontact.archive.journal import Checkpoint, Journal
-from tolcontact.archive.reader import open_unchecked
-from tolcontact.archive.rows import check_room, kept_rows
-from tolcontact.archive.settings import Run, declaration, now, run_settings, versions
-from tolcontact.archive.stored_rows import archived_poses, check_rows, choose, empty_checks
-from tolcontact.archive.variables import open_netcdf, overwrite
+from tolcontact.archive.journal import Checkpoint, Journal, locked_archive
+from tolcontact.archive.reader import check_rows, open_unchecked
+from tolcontact.archive.settings import Run, check_same_model, check_same_run, now, run_settings, versions
+from tolcontact.archive.variables import check_room, kept_rows, open_netcdf, overwrite
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
 from tolcontact.replacing import replacing
 from tolcontact.system import files
 
-# When a run is resumed: another version may have other second solvers, or words for correlations, which the model determines.
-MAY_CHANGE = ("samples", "solver_second", terms.CORRELATIONS)
-POINT_TOLERANCE = 1e-9  # mm: points may differ by rounding from one machine to the next
-
-
-def check_same_run(file: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
-    """Raise ArchiveError if the archive `file`, in the file `path`, is of another model or another run."""
-    if not file.dimensions[terms.REALIZATION].isunlimited():
-        raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
-    check_same_model(file, path, program)
-    _check_same_distributions(file, path, program)
-    for name, value in settings.items():
-        was = getattr(file, name, None)
-        if name not in MAY_CHANGE and was != value:
-            raise ArchiveError(
-                f'"{path}" was run with {name} = {was}, now it is {value}; resume with the same, or write to a new file'
-            )
-    room = len(file["surface"].dimensions[terms.CHECKED])
-    if room != surfaces:
-        raise ArchiveError(f'"{path}" was begun with surfaces = {room}, now it is {surfaces}; resume with the same')
-
-
-def check_same_model(file: netCDF4.Dataset, path: Path, program: Program) -> None:
-    """Raise ArchiveError if the archive `file`, in the file `path`, is of another model."""
-    if _comparable(str(file["model"][terms.DECLARATION.name][...])) != _comparable(declaration(program)):
-        raise ArchiveError(f'"{path}" contains another model than this one; write to a new file')
-    for part in program.nominal.last_parts:
-        if not _is_equal(file[f"field/{terms.group_of(part.name)}"][terms.FIELD_VERTICES.name], part.vertices):
-            raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
-    if changed := changed_body(file, program):
-        raise ArchiveError(f'"{path}": the stiffness of part "{changed}" was another one; write to a new file')
-    for variable, values in contact_values(program).items():
-        if variable in (terms.BOUNDED, terms.PLANE_ERROR):  # they follow from the method, which is compared separately
-            continue
-        stored = file["contact"].variables.get(variable.name)
-        if stored is None or not (variable.kind is str or _is_equal(stored, values)):  # texts are in the declaration
-            raise ArchiveError(f'"{path}": its contact points differ (it was written by {file.versions}); write to a new file')
-
-
-def _check_same_distributions(file: netCDF4.Dataset, path: Path, program: Program) -> None:
-    """Raise ArchiveError if the archive `file`, in the file `path`, describes a distribution otherwise than this version."""
-    for contributor, was in zip(program.draws.contributors, file["sample"][terms.DISTRIBUTION.name][...], strict=True):
-        if str(was) != contributor.description:
-            raise ArchiveError(
-                f'"{path}": contributor "{contributor.label}" was drawn as "{was}", now as "{contributor.description}"; '
-                "write to a new file"
-            )
-
-
-def _comparable(declared: str) -> Any:
-    """Return a declaration without what does not affect results: the lines of the script, and the title block."""
-    ignored = ("declared_at", "title_block")
-    return json.loads(declared, object_hook=lambda item: {key: item[key] for key in item if key not in ignored})
-
-
-def _is_equal(stored: netCDF4.Variable, values: Any) -> bool:
-    return stored.shape == np.shape(values) and np.allclose(stored[...], values, rtol=0, atol=POINT_TOLERANCE, equal_nan=True)
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class ArchiveWriter:
@@ -226,7 +166,7 @@ class ArchiveWriter:
         """
         with open_netcdf(self._current, "r") as file:
             rows, at_random = choose(file, self._checked, seed)
-            return rows, at_random, archived_poses(file, rows, self._stations) if rows.size else None
+            return rows, at_random, _archived_poses(file, rows, self._stations) if rows.size else None
 
     def first_poses(self, end: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the numbers (row,) of the first rows, before `end`, that are not `searched`, and their corrected poses.
@@ -235,7 +175,7 @@ class ArchiveWriter:
         """
         with open_netcdf(self._path, "r") as file:
             rows = np.flatnonzero(file[terms.SEARCHED.name][:end] == 0)
-            poses = archived_poses(file, rows, self._stations)
+            poses = _archived_poses(file, rows, self._stations)
         assert poses is not None
         return rows, poses
 
@@ -280,20 +220,21 @@ def _as_archive_error(path: Path) -> Iterator[None]:
         raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
 
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-
 def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Program) -> None:
     """Raise ArchiveError unless an archive is of the program's model and holds no complete answer of this analysis yet."""
     archive = Path(os.path.realpath(path))
     check_archive(archive)
     with open_netcdf(archive, "r") as file:
         check_same_model(file, archive, program)
-        group = f"{terms.ANALYSES_GROUP}/{record.name}"
-        is_stored = terms.ANALYSES_GROUP in file.groups and record.name in file[terms.ANALYSES_GROUP].groups
-        if is_stored and terms.COARSE not in file[group].ncattrs():
+        stored = _stored_analysis(file, record)
+        if stored is not None and terms.COARSE not in stored.ncattrs():
+            group = f"{terms.ANALYSES_GROUP}/{record.name}"
             raise ArchiveError(f'"{path}" already has {group}, which is not replaced; choose another archive')
+
+
+def _stored_analysis(file: netCDF4.Dataset, record: terms.AnalysisRecord) -> netCDF4.Group | None:
+    analyses = file.groups.get(terms.ANALYSES_GROUP)
+    return None if analyses is None else analyses.groups.get(record.name)
 
 
 def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", program: Program) -> None:
@@ -308,11 +249,77 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", 
             stored = dataset.copy()
             for array in stored.variables.values():
                 array.encoding = {"fletcher32": True} | ({"dtype": "S1"} if array.dtype.kind in "UO" else {})
+            with open_netcdf(part, "r+") as file:
+                if (coarse := _stored_analysis(file, record)) is not None:  # a complete answer replaces it
+                    coarse.delncattr(terms.COARSE)
             group = f"{terms.ANALYSES_GROUP}/{record.name}"
-            with open_netcdf(part, "r+") as file:  # a complete answer replaces a coarse one
-                if terms.ANALYSES_GROUP in file.groups and record.name in file[terms.ANALYSES_GROUP].groups:
-                    file[group].delncattr(terms.COARSE)
             try:
                 stored.to_netcdf(files.plain_path(part), mode="a", group=group, engine="netcdf4")
             except ValueError as error:  # other groups, events, ...
                 raise ArchiveError(f'"{path}" has a coarse {group} of other options; choose another archive') from error
+
+
+def choose(file: netCDF4.Dataset, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers (row,) of at most `count` certified realizations, in order, and whether each is a random choice.
+
+    One third penetrate most at contact points, one third have the most points under load, and the rest are random: a fair
+    sample of all certified realizations.
+    """
+    rows = len(file.dimensions[terms.REALIZATION]) if count else 0
+    certified, depths, loads = _certified(file, rows)
+    lots = np.random.default_rng([seed, rows]).random(len(certified))
+    # Only what exceeds rounding is deeper than anything else.
+    ranked = (np.where(depths > terms.ROUNDED, depths, 0.0), count // 3), (loads, count // 3), (lots, count)
+    deepest, busiest, random = (certified[_largest(values, number)] for values, number in ranked)
+    fair = random[: count - 2 * (count // 3)]
+    numbers = np.array(list(dict.fromkeys([*fair, *deepest, *busiest, *random])), dtype=np.int64)
+    chosen = np.sort(numbers[:count])
+    left_out = np.flatnonzero(~np.isin(random, chosen))
+    return chosen, np.isin(chosen, random[: left_out[0] if len(left_out) else None])
+
+
+def _certified(file: netCDF4.Dataset, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the numbers (row,) of the certified realizations, their penetrations [mm], and their numbers of active points."""
+    pieces = [(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int64))]
+    for start in range(0, rows, terms.PIECE_ROWS):
+        piece = slice(start, min(start + terms.PIECE_ROWS, rows))
+        status, gaps, active = (
+            np.ma.getdata(file[variable.name][piece]) for variable in (terms.STATUS, terms.GAP_MIN, terms.CARRYING)
+        )
+        places = np.flatnonzero(np.isin(status, terms.CERTIFIED))
+        depths = -gaps[places, terms.CORRECTED].min(axis=1, initial=np.inf)
+        pieces.append((start + places, depths, active[places].sum(axis=1)))
+    numbers, depths, loads = map(np.concatenate, zip(*pieces, strict=True))
+    return numbers, depths, loads
+
+
+def _largest(values: np.ndarray, count: int) -> np.ndarray:
+    """Return the places of the largest values (row,) above 0, the first of equals."""
+    places = np.argsort(-values, kind="stable")[:count]
+    return places[values[places] > 0]
+
+
+def _archived_poses(file: netCDF4.Dataset, rows: np.ndarray, stations: Sequence[str]) -> np.ndarray | None:
+    """Return corrected poses (row, part, 12) of some rows; None if the archive does not keep poses.
+
+    With `stations`, the parts of all stations follow one another.
+    """
+    if terms.ROTATION.name not in file.variables:
+        return None
+    groups = [(file[terms.station_group(station)], terms.STATION_POSES) for station in stations] or [(file, terms.POSES)]
+    poses = []
+    for group, variables in groups:
+        t, R = (_rows_of(group[variable.name], rows) for variable in variables)
+        poses.append(pose.pose(R, t))
+    return np.concatenate(poses, axis=1)
+
+
+def _rows_of(stored: netCDF4.Variable, rows: np.ndarray) -> np.ndarray:
+    """Return the values in the corrected state of some rows: one read takes as long for a row as for a block."""
+    values = np.empty((len(rows), *stored.shape[2:]))
+    blocks = rows // terms.BLOCK_ROWS
+    for block in np.unique(blocks):
+        chosen = np.flatnonzero(blocks == block)
+        first, last = rows[chosen].min(), rows[chosen].max()
+        values[chosen] = np.ma.getdata(stored[first : last + 1, terms.CORRECTED])[rows[chosen] - first]
+    return values

@@ -24,7 +24,7 @@ from tolcontact.declaration import Assembly, TitleBlock
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError
 from tolcontact.replacing import check_identities
-from tolcontact.report.figures import grouped
+from tolcontact.report.table import grouped
 from tolcontact.texts import csv_cell, shown
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 from tolcontact.workflow.models import duration

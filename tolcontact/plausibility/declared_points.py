@@ -1,16 +1,29 @@
-"""Points off their part, meshes in other units, and directions that do not fit the surface of their part."""
+"""Points off their part, units, directions and deviations that do not fit their part, its size or their tolerance."""
 
+import math
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.declaration import Assembly, Mesh, Part
+from tolcontact.declaration import Mesh, Part, Variable
 from tolcontact.declaration.geometry import STEP, UNITS
+from tolcontact.declaration.scale import (
+    COARSEST,
+    CONSTANT_SHARE,
+    FINEST,
+    Scale,
+    doubt_of_distribution,
+    doubt_of_rows,
+    grade_width,
+)
 from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.discretization.scales import centre_and_width, scales
+from tolcontact.features import Freedom
 from tolcontact.geometry.tolerances import ON_FACE
 from tolcontact.geometry.triangle_mesh import coordinate_spacing
 from tolcontact.plausibility.trial_draws import TrialDraws
@@ -23,6 +36,9 @@ MAX_SIZE_RATIO = 10.0  # of parts that touch
 MESH_MARGIN = 0.1  # of a mesh's size: largest distance of a point on the mesh
 MIN_POINT_REACH = 0.25  # of a mesh in a probable unit: the least reach of points, since a mesh large enough holds any points
 OUTWARD, ALONG = 0.5, 0.2  # cosines of the angle between a direction and the normal into the part
+SIX_SIGMA = 6.0  # of a zone
+MAX_EFFECT, MIN_EFFECT = 10.0, 0.005  # widths of a tolerance: what a plausible variable adds to it
+MAX_CP = 10.0
 
 
 class DeclaredPoint(NamedTuple):
@@ -33,10 +49,10 @@ class DeclaredPoint(NamedTuple):
     position: np.ndarray
 
 
-def location_designation(assembly: Assembly, part: Part, station: str = "") -> str:
-    """Return the name of a part's location in a warning: the part, and the line of the script that locates it in a station."""
-    location = next((entry for entry in assembly.locations if entry.part is part and entry.station == station), None)
-    return f'part "{part.name}" ({location.declared_at if location else part.declared_at})'
+def location_designation(nominal: Nominal, part: NominalPart) -> str:
+    """Return the name of a part's location in a warning: the part, and the line of the script that locates it there."""
+    locations = (entry for entry in nominal.assembly.locations if entry.part is part.part and entry.station == part.station)
+    return f'part "{part.name}" ({next(locations, part.part).declared_at})'
 
 
 def doubtful_units(draws: TrialDraws) -> Iterator[str]:
@@ -57,7 +73,7 @@ def doubtful_units(draws: TrialDraws) -> Iterator[str]:
 def _far_point(nominal: NominalPart, geometry: Mesh, declared: list[DeclaredPoint]) -> Iterator[str]:
     """Yield the point that lies farthest off the mesh, if all points would lie on it in another unit."""
     if unit := _probable_unit(nominal, declared):
-        distances = _outside(np.array([point.position for point in declared]), nominal.mesh.bounds)
+        distances = _outside(declared, nominal.mesh.bounds)
         if distances.max() > nominal.mesh.scale:
             point = declared[int(distances.argmax())].phrase
             advice = _advice(geometry, float(nominal.mesh.scale), unit)
@@ -69,20 +85,18 @@ def _probable_unit(nominal: NominalPart, declared: list[DeclaredPoint]) -> str |
     geometry, bounds, size = nominal.part.geometry, nominal.mesh.bounds, float(nominal.mesh.scale)
     if not declared or not isinstance(geometry, Mesh) or _states_units(geometry):
         return None
-    points = np.array([point.position for point in declared])
-    distances = _outside(points, bounds)
+    distances = _outside(declared, bounds)
     if np.median(distances) <= MESH_MARGIN * size:
         return None
     for unit in sorted(UNITS, key=UNITS.__getitem__):
         factor = UNITS[unit] / _assumed_unit(geometry)
-        is_on_mesh = (_outside(points, factor * bounds) <= MESH_MARGIN * factor * size).all()
+        is_on_mesh = (_outside(declared, factor * bounds) <= MESH_MARGIN * factor * size).all()
         if is_on_mesh and distances.max() >= MIN_POINT_REACH * factor * size:
             return unit
     return None
 
 
 def _states_units(geometry: Mesh) -> bool:
-    """Return whether the source states its own units."""
     source = geometry.source
     is_file = isinstance(source, str | Path)
     return Path(source).suffix.lower() in STEP if is_file else getattr(source, "units", None) is not None
@@ -135,22 +149,19 @@ def far_points(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each part with declared points far off its body, about the farthest one."""
     points = _declared_points(draws)
     for nominal in draws.program.nominal.last_parts:
-        declared = points[nominal.part]
+        declared, size = points[nominal.part], float(nominal.mesh.scale)
         if not declared or _probable_unit(nominal, declared):
             continue
-        positions = np.array([point.position for point in declared])
-        size = float(nominal.mesh.scale)
-        distances = _outside(positions, nominal.mesh.bounds)
-        farthest = int(distances.argmax())
-        if distances[farthest] <= FAR_SHARE * size:
-            continue
+        distances = _outside(declared, nominal.mesh.bounds)
+        farthest = declared[int(distances.argmax())]
         others = int((distances > FAR_SHARE * size).sum()) - 1
-        yield (
-            f"{declared[farthest].owner}: its point ({_row(positions[farthest])}) lies {distances[farthest]:.4g} mm off part "
-            f'"{nominal.name}", which is {size:.4g} mm across'
-            + (f", as do {others} more points of it" if others > 1 else ", as does one more point of it" if others else "")
-            + f"; {_cause(nominal, positions[farthest])}"
-        )
+        if others >= 0:
+            yield (
+                f"{farthest.owner}: its point ({_row(farthest.position)}) lies {distances.max():.4g} mm off part "
+                f'"{nominal.name}", which is {size:.4g} mm across'
+                + (f", as do {others} more points of it" if others > 1 else ", as does one more point of it" if others else "")
+                + f"; {_cause(nominal, farthest.position)}"
+            )
 
 
 def unfit_directions(draws: TrialDraws) -> Iterator[str]:
@@ -164,13 +175,13 @@ def unfit_directions(draws: TrialDraws) -> Iterator[str]:
         if not isinstance(scheme, tuple) or nominal.owners:
             continue
         R_WP = nominal.placement[0]
-        place = location_designation(draws.program.nominal.assembly, nominal.part, nominal.station)
+        place = location_designation(draws.program.nominal, nominal)
         normals = [-_normals_at(nominal, np.array(locator.point)) for locator in scheme]
         on_surface = [(locator, inward) for locator, inward in zip(scheme, normals, strict=True) if len(inward)]
         fits = [bool((inward @ (R_WP.T @ np.array(locator.direction))).max() > 1 - ALONG) for locator, inward in on_surface]
-        for locator, inward in on_surface:
+        for locator, inward in on_surface if all(fits) else ():
             direction = np.array(locator.direction)
-            if np.abs(inward @ direction).max() < ALONG and all(fits):
+            if np.abs(inward @ direction).max() < ALONG:
                 yield (
                     f'{place}: the direction ({_row(direction)}) of locator "{locator.name}" lies along the surface of the '
                     f"part; directions are stated in the part's own frame; for this direction of the assembly write "
@@ -194,23 +205,19 @@ def parts_in_other_units(draws: TrialDraws) -> list[Part]:
 
 def _declared_points(draws: TrialDraws) -> "defaultdict[Part, list[DeclaredPoint]]":
     """Return the points that are declared by their coordinates, by part, in the part's own frame."""
-    assembly = draws.program.nominal.assembly
-    points: defaultdict[Part, list[DeclaredPoint]] = defaultdict(list)
-    for nominal in draws.program.nominal.parts:
+    model, points = draws.program.nominal, defaultdict[Part, list[DeclaredPoint]](list)
+    for nominal in model.parts:
         for locator in nominal.scheme if isinstance(nominal.scheme, tuple) else ():
-            place = location_designation(assembly, nominal.part, nominal.station)
-            points[locator.part or nominal.part].append(
-                DeclaredPoint(f'{place}: locator "{locator.name}"', f'its locator "{locator.name}"', np.array(locator.point))
-            )
-    for measure in assembly.measures:
-        for point in measure.points:
-            if point.position is not None:
-                owner, phrase = measure.designation, f'the point of measurement "{measure.name}"'
-                points[point.part].append(DeclaredPoint(owner, phrase, np.array(point.position)))
-    for force in assembly.forces:
-        if force.at.position is not None:
-            owner, phrase = force.designation, f'the point of force "{force.name}"'
-            points[force.at.part].append(DeclaredPoint(owner, phrase, np.array(force.at.position)))
+            name = f'locator "{locator.name}"'
+            point = DeclaredPoint(f"{location_designation(model, nominal)}: {name}", f"its {name}", np.array(locator.point))
+            points[locator.part or nominal.part].append(point)
+    for owner, phrase, declared in (
+        *((measure, f'measurement "{measure.name}"', point) for measure in model.assembly.measures for point in measure.points),
+        *((force, f'force "{force.name}"', force.at) for force in model.assembly.forces),
+    ):
+        if declared.position is not None:
+            place = DeclaredPoint(owner.designation, f"the point of {phrase}", np.array(declared.position))
+            points[declared.part].append(place)
     return points
 
 
@@ -218,14 +225,15 @@ def _cause(nominal: NominalPart, point: np.ndarray) -> str:
     """Return the likely cause of a point that lies off its part."""
     R_WP, t_WP = nominal.placement
     meant = (point - t_WP) @ R_WP
-    if _outside(meant[None], nominal.mesh.bounds)[0] <= ON_FACE * nominal.mesh.scale:
+    if _outside([DeclaredPoint("", "", meant)], nominal.mesh.bounds)[0] <= ON_FACE * nominal.mesh.scale:
         return f"points are stated in the part's own frame; for this point of the assembly write ({_row(meant)})"
     return "check the coordinates, which are in the part's own frame [mm]"
 
 
-def _outside(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
-    """Return how far (point,) [mm] points (point, 3) lie outside the box with these corners (2, 3)."""
-    return np.asarray(np.linalg.norm(np.maximum(0, np.maximum(bounds[0] - points, points - bounds[1])), axis=1))
+def _outside(points: Sequence[DeclaredPoint], bounds: np.ndarray) -> np.ndarray:
+    """Return how far (point,) [mm] points lie outside the box with these corners (2, 3)."""
+    positions = np.array([point.position for point in points])
+    return np.asarray(np.linalg.norm(np.maximum(0, np.maximum(bounds[0] - positions, positions - bounds[1])), axis=1))
 
 
 def _normals_at(nominal: NominalPart, point: np.ndarray) -> np.ndarray:
@@ -247,3 +255,64 @@ def _normals_at(nominal: NominalPart, point: np.ndarray) -> np.ndarray:
 
 def _row(values: np.ndarray) -> str:
     return ", ".join(f"{value:.4g}" for value in np.round(values, 9) + 0.0)
+
+
+def out_of_scale(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each population, distribution and variable that does not fit what it deviates."""
+    program = draws.program
+    freedoms = {freedom.label: freedom for freedom in program.draws.contributors}
+    stated = scales(program.nominal)
+    by_label = {
+        label: scale if scale.width else replace(scale, width=SIX_SIGMA * math.sqrt(freedoms[label].variance))
+        for label, scale in stated.items()
+    }
+    measured = dict[str, np.ndarray]()
+    for population in program.nominal.assembly.populations:
+        columns = dict(zip(population.columns, population.values.T, strict=True))
+        measured |= columns
+        for label, values in columns.items():
+            if label in by_label and (doubt := doubt_of_rows(by_label[label], label, values)):
+                yield f"{population.designation}: {doubt}"
+                break
+    reported = set[tuple[str, str]]()
+    for label, freedom in freedoms.items():
+        doubt = "" if label in measured else _doubt(freedom, stated.get(label))
+        key = label.rpartition(".")[0], doubt
+        if doubt and key not in reported:  # once for the locators of a part
+            reported.add(key)
+            yield f'{freedom.source} "{label}": {doubt}'
+    for variable in program.nominal.assembly.variables:
+        centre, width = centre_and_width(freedoms[variable.name])
+        if variable.name in measured:
+            values = measured[variable.name]
+            centre, width = float(values.mean()), SIX_SIGMA * float(values.std())
+        yield from _doubts_of_variable(variable, centre, width, by_label)
+
+
+def _doubt(freedom: Freedom, scale: Scale | None) -> str:
+    """Return what is odd about the distribution of a freedom itself."""
+    controls = freedom.tolerance or freedom.geometric
+    if controls is not None and (controls.cp or 1.0) > MAX_CP:
+        return f"its cp is {controls.cp:g}, which no process has; a capability of 133 % is 1.33"
+    if scale is None or freedom.tolerance is None or isinstance(freedom.tolerance.distribution, str):
+        return ""
+    return doubt_of_distribution(scale, *centre_and_width(freedom))
+
+
+def _doubts_of_variable(variable: Variable, centre: float, width: float, by_label: dict[str, Scale]) -> Iterator[str]:
+    """Yield what is odd about what a variable, of a centre and a width, adds to the first contributor that it does not fit."""
+    for label, factor in variable.drives.items():
+        scale = by_label.get(label)
+        if scale is None or not factor or not width:
+            continue
+        has_zone = scale.width > CONSTANT_SHARE * scale.part
+        largest = MAX_EFFECT * scale.width if has_zone else grade_width(COARSEST, scale.extent)
+        smallest = MIN_EFFECT * scale.width if has_zone else grade_width(FINEST, scale.extent)
+        effect, offset = abs(factor) * width, factor * centre
+        if effect < smallest or max(effect, abs(offset)) > largest:
+            zone = f"its own zone of {scale.width:.3g} mm" if has_zone else f"a length of {scale.extent:.4g} mm"
+            yield (
+                f"{variable.designation}: it adds {offset:.3g} ± {effect / 2:.2g} mm (3 sigma) to {label}, which does not fit "
+                f"{zone}; check its tolerance [{variable.units}] and its factor [mm per {variable.units}]"
+            )
+            return

@@ -1,15 +1,14 @@
 """The check of drawings: what tolerances leave open, what has no effect, and what the simulation takes as perfect."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain
-from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact.declaration import GeometricTolerance, Pattern
 from tolcontact.declaration.feature_tolerance import LineProfile, Profile
 from tolcontact.discretization import Nominal
-from tolcontact.features import FeatureOfSize, NominalFeature, NominalPattern, PlaneFeature, datum_frame, uncontrolled
+from tolcontact.features import FeatureOfSize, NominalPattern, PlaneFeature, datum_frame, uncontrolled
 
 LISTED = 6  # freedoms or faces by name
 LOCATED = "tc.Position or tc.Profile to datums that lock it"
@@ -20,13 +19,8 @@ ADVICE = {
 }  # fmt: skip
 
 
-class Remark(NamedTuple):
-    """A sentence on the feature with a `name` of the drawing of a `part`; without a part, on all drawings."""
-
-    text: str
-    part: str = ""
-    noun: str = ""
-    name: str = ""
+# A sentence, and the part, noun and name of what it is on; without a part, it is on all drawings.
+Remark = tuple[str, str, str, str]
 
 
 def drawing_remarks(nominal: Nominal) -> Iterator[str]:
@@ -83,7 +77,7 @@ def perfect_datums(nominal: Nominal) -> Iterator[Remark]:
             and isinstance(pattern.geometries[0], PlaneFeature) and not isinstance(pattern.geometries[0], FeatureOfSize)
         ]  # fmt: skip
         if flat:
-            yield Remark("no tolerance of form: taken as flat; add tc.Flatness", part.name, "datum", _listed(flat))
+            yield "no tolerance of form: taken as flat; add tc.Flatness", part.name, "datum", _listed(flat)
 
 
 def unused_datums(nominal: Nominal) -> Iterator[Remark]:
@@ -93,7 +87,7 @@ def unused_datums(nominal: Nominal) -> Iterator[Remark]:
         letters = [declared.datum for declared in part.part.toleranced if declared.datum]
         letters += [targets.letter for targets in part.part.targets]
         if idle := [letter for letter in letters if letter not in used]:
-            yield Remark("no tolerance refers to it; refer to it, or leave the letter out", part.name, "datum", _listed(idle))
+            yield "no tolerance refers to it; refer to it, or leave the letter out", part.name, "datum", _listed(idle)
 
 
 def ineffective_tolerances(nominal: Nominal) -> Iterator[Remark]:
@@ -117,7 +111,7 @@ def perfect_faces(nominal: Nominal) -> Iterator[Remark]:
     if perfect:
         faces = [f"{part} ({_listed(list(dict.fromkeys(pairs)))})" for part, pairs in perfect.items()]
         touched = f"no tolerance touches the faces in contact of {_listed(faces)}: taken as perfect"
-        yield Remark(f"{touched}; if this is not meant, declare them as features with tolerances")
+        yield f"{touched}; if this is not meant, declare them as features with tolerances", "", "", ""
 
 
 def _moot_modifiers(nominal: Nominal, pattern: NominalPattern, tolerance: GeometricTolerance) -> Iterator[str]:
@@ -161,7 +155,8 @@ def _followed(nominal: Nominal, pattern: NominalPattern) -> np.ndarray:
     if not places:
         return pattern.values
     system, orientation_only = zip(*places, strict=True)
-    frame = datum_frame(_features(system, datums), pattern.centre, pattern.reach, len(nominal.contributors), orientation_only)
+    features = [[datum for letter in letters for datum in datums[letter]] for letters in system]
+    frame = datum_frame(features, pattern.centre, pattern.reach, len(nominal.contributors), orientation_only)
     return pattern.values @ frame.free
 
 
@@ -172,15 +167,9 @@ def _letter(pattern: NominalPattern) -> str | None:
     return declared.datum or next(targeted, None)
 
 
-def _features(
-    system: Sequence[Sequence[str]], datums: Mapping[str | None, Sequence[NominalFeature]]
-) -> list[list[NominalFeature]]:
-    return [[datum for letter in letters for datum in datums[letter]] for letters in system]
-
-
 def _remark(pattern: NominalPattern, text: str) -> Remark:
     declared = pattern.declared
-    return Remark(text, declared.part.name, declared.noun, declared.designation.removeprefix(f"{declared.noun} "))
+    return text, declared.part.name, declared.noun, declared.designation.removeprefix(f"{declared.noun} ")
 
 
 def _listed(names: Sequence[str]) -> str:

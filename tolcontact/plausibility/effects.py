@@ -1,23 +1,29 @@
-"""Tolerances without the effect that they seem to have: points and locators on a face that do not follow it, unused faces."""
+"""Tolerances without the effect that they seem to have, and faces that do not fit what is declared of them."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact.compilation import Program
-from tolcontact.declaration import Feature, Measure, Pattern, Point
+from tolcontact.declaration import Assembly, Brep, Face, Feature, Measure, Pattern, Point
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.discretization.measured_geometry import Combined, Heights, NominalMeasurement
 from tolcontact.features import FaceDeviation, NominalFeature
 from tolcontact.features.freedoms import FEATURE, FORM, VARIABLE
+from tolcontact.geometry.brep_face import describe_faces
+from tolcontact.geometry.faces import Meshes, triangles
+from tolcontact.geometry.files import BREP
 from tolcontact.geometry.tolerances import ON_FACE
 from tolcontact.plausibility.declared_points import location_designation
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws
 
 MIN_MOTION = 1e-9  # mm, at three sigma
 LISTED = 3  # features by name
+ROUNDING = 1e-6  # of the width of a zone
 
 
 class Use(NamedTuple):
@@ -32,10 +38,12 @@ class Use(NamedTuple):
 def unfollowed_by_measures(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each measure with a point that lies on a deviating face, and belongs to the part alone."""
     nominal = draws.program.nominal
-    scenes = [
-        (model, *row) for model in nominal.scenes or (nominal,) for row in zip(model.measures, model.measurements, strict=True)
+    owned = [
+        (measure, use)
+        for model in nominal.scenes or (nominal,)
+        for measure, measurement in zip(model.measures, model.measurements, strict=True)
+        for use in _measured_points(model, measure, measurement)
     ]
-    owned = [(measure, use) for model, measure, of in scenes for use in _measured_points(model, measure, of)]
     doubtful = set[Measure]()
     for number, feature, motion in _unfollowed(draws, [use for _, use in owned]):
         measure, use = owned[number]
@@ -59,7 +67,7 @@ def unfollowed_by_locators(draws: TrialDraws) -> Iterator[str]:
             label, advice, _ = owned[number]
             if not _is_in_contact(nominal, part, feature):
                 yield (
-                    f"{location_designation(nominal.assembly, part.part, part.station)}: locator "
+                    f"{location_designation(nominal, part)}: locator "
                     f'"{label.rpartition(".")[2]}" lies on {_named(feature)}, which deviates there by {motion:.3g} mm '
                     f"(3 sigma), but the part does not follow it; {advice.format(feature.feature.name)}"
                 )
@@ -79,25 +87,16 @@ def unvaried(draws: TrialDraws) -> Iterator[str]:
         )
         return
     yield from _unvaried_measures(draws)
-    assembly = nominal.assembly
-    causes = [
-        *((correlation, correlation.labels) for correlation in assembly.correlations),
-        *((variable, (variable.name,)) for variable in assembly.variables),
-    ]
-    for cause, labels in causes:
-        still = [label for label in labels if not varies[label]]
-        if still:
+    causes = [(correlation, correlation.labels) for correlation in nominal.assembly.correlations]
+    for cause, labels in (*causes, *((variable, (variable.name,)) for variable in nominal.assembly.variables)):
+        if still := [label for label in labels if not varies[label]]:
             yield f'{cause.designation}: "{still[0]}" does not vary, so it has no effect; give it a tolerance, or leave it out'
 
 
 def _unvaried_measures(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence on the measures that no tolerance changes, on parts that contact does not move."""
-    program, nominal = draws.program, draws.program.nominal
-    still = [
-        k
-        for k, values in enumerate(draws.measured.T)
-        if len(values) and np.isfinite(values).all() and np.ptp(values) <= MIN_MOTION
-    ]
+    program, nominal, measured = draws.program, draws.program.nominal, draws.measured.T
+    still = [k for k, x in enumerate(measured) if len(x) and np.isfinite(x).all() and np.ptp(x) <= MIN_MOTION]
     on_pose = _dependence(program, "observe", "poses", "measured") if still else np.zeros(0)
     owners = {k: np.flatnonzero(on_pose[k].reshape(len(nominal.parts), -1).any(axis=1)) for k in still}
     unmoved = [k for k, parts in owners.items() if not any(nominal.may_differ(int(part)) for part in parts)]
@@ -191,8 +190,8 @@ def _unfollowed(draws: TrialDraws, uses: Sequence[Use]) -> list[tuple[int, Nomin
         for index, surface in enumerate(feature.surfaces if numbers else ()):
             R_WP, t_WP = placement = uses[numbers[0]].part.placement
             places = np.array([(uses[k].point - t_WP) @ R_WP for k in numbers])
-            triangles, feet = surface.nearest(places)
-            normals, distances = surface.normals(triangles, feet) @ R_WP.T, np.linalg.norm(feet - places, axis=1)
+            numbers_of_triangles, feet = surface.nearest(places)
+            normals, distances = surface.normals(numbers_of_triangles, feet) @ R_WP.T, np.linalg.norm(feet - places, axis=1)
             for row in np.flatnonzero(distances <= ON_FACE * surface.mesh.scale):
                 use, normal = uses[numbers[row]], normals[row]
                 motion = _motion(draws, feature.deviation(index, placement), use, normal) * abs(float(normal @ use.direction))
@@ -205,20 +204,70 @@ def _motion(draws: TrialDraws, deviation: FaceDeviation, use: Use, direction: np
     outward = deviation.outward(use.point[None], direction[None])[0]
     freedoms = [draws.program.nominal.freedoms[column] for column in deviation.columns]
     outward[[freedom.source == VARIABLE for freedom in freedoms]] = 0.0  # a part that expands follows none of its features
-    motions = draws.deviations[:, deviation.columns] @ outward
-    motion = SIGMAS * float(motions.std())
+    motion = SIGMAS * float((draws.deviations[:, deviation.columns] @ outward).std())
     return motion if motion > MIN_MOTION else 0.0
 
 
 def _is_in_contact(nominal: Nominal, part: NominalPart, feature: NominalFeature) -> bool:
     """Return whether contact of a part with the face of a feature decides where it comes to lie."""
-    sides = [
-        (nominal.parts[pair.moving], pair.reference is not None and nominal.parts[pair.reference], pair.deviating)
-        for pair in nominal.pairs
+    pairs = [
+        pair for pair in nominal.pairs if part in [nominal.parts[k] for k in (pair.moving, pair.reference) if k is not None]
     ]
-    names = [face.name for *bodies, faces in sides if part in bodies for face in faces if face is not None]
-    return feature.label in names
+    return feature.label in [face.name for pair in pairs for face in pair.deviating if face is not None]
 
 
 def _named(feature: NominalFeature) -> str:
     return f'feature "{feature.feature.name}" of {feature.feature.part.name}'
+
+
+def partial_surfaces(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each face on some B-rep faces of a curved surface that continues in faces not chosen.
+
+    Only B-rep faces that are chosen individually are checked: other criteria leave out the rest on purpose.
+    """
+    for owner, face in _faces(draws.program.nominal.assembly):
+        for doubt in islice(_doubts(face, draws.program.nominal.meshes), 1):
+            yield f"{owner}: its face {face} is {doubt}"
+
+
+def _faces(assembly: Assembly) -> Iterator[tuple[str, Face]]:
+    """Yield the faces of features and contact pairs, and how a message names these."""
+    for part in assembly.parts:
+        for feature in part.features:
+            for face in feature.faces:
+                yield f'part "{part.name}": {feature.designation}', face
+    for pair in assembly.pairs:
+        for face in (pair.moving, pair.reference):
+            yield pair.designation, face
+
+
+def _doubts(face: Face, meshes: Meshes) -> Iterator[str]:
+    choices, mesh = [selection for selection in face.selections if isinstance(selection, Brep)], meshes[face.part]
+    is_partial = len(choices) < len(face.selections) or any(choice.whole for choice in choices)
+    if not choices or is_partial or BREP not in mesh.face_attributes:
+        return
+    chosen = {int(number) + 1 for number in np.unique(np.asarray(mesh.face_attributes[BREP]).ravel()[triangles(face, meshes)])}
+    for description in describe_faces(mesh):
+        if description.number in chosen and description.kind != "plane" and not chosen.issuperset(description.whole):
+            count, kind = len(chosen.intersection(description.whole)), description.kind
+            yield (
+                f"{count} of the {len(description.whole)} faces of one {kind}; for all of them: "
+                f"tc.select.Brep({description.number}, whole=True)"
+            )
+
+
+def measured_forms(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each feature with measured faces that lie in no zone of the stated width."""
+    for pattern in draws.program.nominal.patterns:
+        for member in pattern.members:
+            if member.form is None or pattern.form is None:
+                continue
+            stated, widths = float(pattern.form.width), member.form.scans
+            if beyond := [path for path, width in widths.items() if width > (1 + ROUNDING) * stated]:
+                worst = max(beyond, key=lambda path: widths[path])
+                yield (
+                    f'part "{member.feature.part.name}": {member.feature.designation}: '
+                    f"{len(beyond)} of {len(widths)} measured faces are beyond the {pattern.form.kind} of {stated:.4g} mm that "
+                    f'is stated; "{Path(worst).name}" has {widths[worst]:.3g} mm; forms are drawn as they were measured, so '
+                    "check the tolerance, and the files for outliers"
+                )

@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import Program
 from tolcontact.compilation.program import STIFFER, overheld, stiffer, with_flexibility
+from tolcontact.declaration import Measure
 from tolcontact.elasticity import ElasticBody
 from tolcontact.errors import GeometryFault, NominalWarning
 from tolcontact.mechanics.flexibility import Bodies, PartFlexibility, elastic_bodies, part_flexibilities
@@ -172,8 +174,7 @@ def _superposition(part: LoadedPart) -> float:
     return float(np.abs(summed - at_once).max() / np.abs(at_once).max()) if np.abs(at_once).max(initial=0) else 0.0
 
 
-@dataclass(frozen=True)
-class Law:
+class Law(NamedTuple):
     """A law of linear elasticity: its `error` of a part is relative to what `unit` names, and `remedy` mends a large one."""
 
     name: str
@@ -250,17 +251,15 @@ def mesh_remarks(draws: TrialDraws, bodies: Bodies, deviations: Float[Array, "n 
         share = next((share for share in EDGE_SHARES if len(body.nodes) / share**DIMENSIONS <= MAX_NODES), 1.0)
         try:
             if body.finer is None:
-                reason = "its stiffness is a file; refine the mesh in the program that wrote it"
+                reason = "none, its stiffness is a file; refine the mesh in the program that wrote it"
             elif share == 1.0:
-                reason = f"it has {len(body.nodes)} nodes, and a finer one would have more than {MAX_NODES}"
+                reason = f"none, it has {len(body.nodes)} nodes, and a finer one would have more than {MAX_NODES}"
             else:
-                finer[part], largest_share, reason = body.finer(share), max(share, largest_share), ""
+                finer[part], largest_share = body.finer(share), max(share, largest_share)
+                reason = f"{len(finer[part].nodes)} nodes in place of {len(body.nodes)}"
         except GeometryFault as fault:
-            reason = str(fault)
-        if reason:
-            yield f"finer mesh of part {part.name}: none, {reason}"
-        else:
-            yield f"finer mesh of part {part.name}: {len(finer[part].nodes)} nodes in place of {len(body.nodes)}"
+            reason = f"none, {fault}"
+        yield f"finer mesh of part {part.name}: {reason}"
     if not largest_share:
         return
     refined = with_flexibility(program, part_flexibilities(program.nominal, finer))
@@ -272,22 +271,21 @@ def mesh_remarks(draws: TrialDraws, bodies: Bodies, deviations: Float[Array, "n 
 def _uncertainties(draws: TrialDraws, errors: Float[Array, " measure"]) -> Iterator[str]:
     """Yield the uncertainty of each measurement by the mesh, its largest share of a tolerance or of 6 sigma first."""
     program = draws.program
-    rows: list[tuple[float, str, str, str]] = []
+    rows: list[tuple[float, Measure, str]] = []
     for k, (measure, error) in enumerate(zip(program.nominal.measures, errors.tolist(), strict=True)):
         limits = program.limits(k)
         width, of = limits.upper - limits.lower, "its tolerance"
         if not np.isfinite(width):
             width, of = 6 * float(spread(draws.resolved.measured[:, CORRECTED, k])), "its 6 sigma"
         share = error / width if width > program.accuracies[k] else 0.0
-        stated = f"{error:.2g} {measure.units} by the mesh" + f", {share:.2g} of {of}" * (share > 0)
-        rows.append((share, measure.name, measure.designation, stated))
+        rows.append((share, measure, f"{error:.2g} {measure.units} by the mesh" + f", {share:.2g} of {of}" * (share > 0)))
     rows.sort(key=lambda row: -row[0])
-    for share, name, designation, stated in rows[:MAX_LISTED]:
-        yield f"{name}: uncertain by {stated}"
+    for share, measure, stated in rows[:MAX_LISTED]:
+        yield f"{measure.name}: uncertain by {stated}"
         if not share <= MAX_SHARE:
             _doubt(
-                f"{designation}: it is uncertain by {stated} of elastic parts (at most {MAX_SHARE:g} is expected); give a "
-                "smaller element_size, or import a stiffness matrix of shells"
+                f"{measure.designation}: it is uncertain by {stated} of elastic parts (at most {MAX_SHARE:g} is expected); "
+                "give a smaller element_size, or import a stiffness matrix of shells"
             )
     if len(rows) > MAX_LISTED:
         yield f"{len(rows) - MAX_LISTED} more measurements: uncertain by no larger share"

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from itertools import islice
 
 import numpy as np
 
@@ -45,37 +45,28 @@ def wide_tolerances(draws: TrialDraws) -> Iterator[str]:
     for nominal in draws.program.nominal.parts:
         if nominal.part in in_other_units:
             continue
-        place = location_designation(draws.program.nominal.assembly, nominal.part, nominal.station)
+        place = location_designation(draws.program.nominal, nominal)
         zones = list(_zones(nominal, place))
-        widest = max(zones, key=lambda zone: zone.width / zone.largest, default=None)
-        narrowest = min(zones, key=lambda zone: zone.width / zone.smallest, default=None)
-        if widest is not None and widest.width > widest.largest:
+        owner, width, phrase, largest, _ = max(zones, key=lambda zone: zone[1] / zone[3], default=NO_ZONE)
+        if width > largest:
             yield (
-                f"{widest.owner}: its tolerance of {widest.width:.4g} mm is wide compared with {widest.extent_in_words}; a "
-                "tolerance is the full width of its zone, in mm"
+                f"{owner}: its tolerance of {width:.4g} mm is wide compared with {phrase}; a tolerance is the full width of "
+                "its zone, in mm"
             )
-        elif narrowest is not None and narrowest.width < narrowest.smallest:
+            continue
+        owner, width, phrase, _, smallest = min(zones, key=lambda zone: zone[1] / zone[4], default=NO_ZONE)
+        if width < smallest:
             yield (
-                f"{narrowest.owner}: its tolerance of {narrowest.width:.4g} mm is narrower than the finest standard grade for "
-                f"{narrowest.extent_in_words}; tolerances are in mm, not in metres"
+                f"{owner}: its tolerance of {width:.4g} mm is narrower than the finest standard grade for {phrase}; tolerances "
+                "are in mm, not in metres"
             )
-        elif fault := _tilt(nominal, place) or _leverage(nominal, place):
-            yield fault
+        elif len(nominal.locators):
+            yield from islice(_weak_locators(nominal, place), 1)
 
 
-class Zone(NamedTuple):
-    """A declared zone: its owner in a message, its width [mm], and the length [mm] that it is compared with, also in words."""
-
-    owner: str
-    width: float
-    extent: float
-    extent_in_words: str
-    largest: float
-
-    @property
-    def smallest(self) -> float:
-        """The smallest plausible width [mm]."""
-        return grade_width(FINEST, self.extent)
+# The owner of a zone in a message, its width [mm], what it is compared with in words, and its largest and smallest width [mm].
+Zone = tuple[str, float, str, float, float]
+NO_ZONE: Zone = ("", 1.0, "", 1.0, 1.0)
 
 
 def _zones(nominal: NominalPart, place: str) -> Iterator[Zone]:
@@ -85,53 +76,41 @@ def _zones(nominal: NominalPart, place: str) -> Iterator[Zone]:
     for label, tolerance in zip(nominal.locators.labels, nominal.locators.tolerances, strict=True):
         if tolerance.range and tolerance.width > CONSTANT_SHARE * extent:
             owner = f'{place}: locator "{label.rpartition(".")[2]}"'
-            yield Zone(owner, tolerance.width, extent, part, WIDE_SHARE * extent)
+            yield owner, tolerance.width, part, WIDE_SHARE * extent, grade_width(FINEST, extent)
     for declared in nominal.part.toleranced:
-        where = f'part "{nominal.name}": {declared.designation}'
         for control in declared.tolerances:
             if isinstance(control, Size):
                 width, length, phrase = control.upper - control.lower, control.nominal, f"a size of {control.nominal:.4g} mm"
             else:
                 width, length, phrase = control.width, extent, part
             if is_length(width) and width > CONSTANT_SHARE * extent:
+                owner = f'part "{nominal.name}": {declared.designation}: {control.kind}'
                 largest = min(grade_width(COARSEST, length), WIDE_SHARE * length)
-                yield Zone(f"{where}: {control.kind}", float(width), length, phrase, largest)
+                yield owner, float(width), phrase, largest, grade_width(FINEST, length)
 
 
-def _tilt(nominal: NominalPart, place: str) -> str:
-    """Return a sentence on locators that rotate their part by more than MAX_TILT; empty if they do not."""
+def _weak_locators(nominal: NominalPart, place: str) -> Iterator[str]:
+    """Yield that locators rotate their part by more than MAX_TILT, or displace a corner by many times their own deviation."""
     locators = nominal.locators
-    if not len(locators):
-        return ""
-    matrix, _ = locators.placing_matrix
+    matrix, centre = locators.placing_matrix
+    apart = np.linalg.norm(locators.points[:, None] - locators.points[None], axis=2)
+    closest = f"(the closest ones are {apart[apart > 0].min(initial=np.inf):.3g} mm apart)"
     sigmas = np.array([tolerance.width / 6 for tolerance in locators.tolerances])
     tilt = SIGMAS * float(np.sqrt(((matrix[3:] * sigmas) ** 2).sum()))
-    if not tilt > MAX_TILT:
-        return ""
-    apart = np.linalg.norm(locators.points[:, None] - locators.points[None], axis=2)
-    return (
-        f"{place}: its locators turn the part by {math.degrees(tilt):.0f} degrees (3 sigma) with tolerances of up to "
-        f"{6 * sigmas.max():.3g} mm; move them apart (the closest ones are {apart[apart > 0].min():.3g} mm apart), "
-        "or check the tolerances, which are in mm"
-    )
-
-
-def _leverage(nominal: NominalPart, place: str) -> str:
-    """Return a sentence on locators that displace a corner by many times their own deviation; empty if they do not."""
-    locators = nominal.locators
-    if not len(locators):
-        return ""
-    matrix, centre = locators.placing_matrix
+    if tilt > MAX_TILT:
+        yield (
+            f"{place}: its locators turn the part by {math.degrees(tilt):.0f} degrees (3 sigma) with tolerances of up to "
+            f"{6 * sigmas.max():.3g} mm; move them apart {closest}, or check the tolerances, which are in mm"
+        )
     arms = nominal.vertices - centre
     motions = np.linalg.norm(matrix[:3].T[:, None] + np.cross(matrix[3:].T[:, None], arms[None]), axis=2)
     row, corner = np.unravel_index(int(motions.argmax()), motions.shape)
-    if not motions[row, corner] > MAX_LEVERAGE:
-        return ""
-    apart = np.linalg.norm(locators.points[:, None] - locators.points[None], axis=2)
-    return (
-        f'{place}: 1 mm at locator "{locators.labels[row].rpartition(".")[2]}" is {motions[row, corner]:.3g} mm at a corner of '
-        f"the part; move its locators apart (the closest ones are {apart[apart > 0].min():.3g} mm apart)"
-    )
+    if motions[row, corner] > MAX_LEVERAGE:
+        name = locators.labels[row].rpartition(".")[2]
+        yield (
+            f'{place}: 1 mm at locator "{name}" is {motions[row, corner]:.3g} mm at a corner of the part;'
+            f" move its locators apart {closest}"
+        )
 
 
 def measure_limits(draws: TrialDraws) -> Iterator[str]:
@@ -143,31 +122,29 @@ def measure_limits(draws: TrialDraws) -> Iterator[str]:
         nominal, limits = float(program.nominal_measures[k]), program.limits(k)
         if limits.are_open or not math.isfinite(nominal):
             continue
-        place = measure.designation
-        stated = f"limits ({_side(limits.lower)} to {_side(limits.upper)} {measure.units})"
+        place, width = measure.designation, limits.upper - limits.lower
+        ends = [f"{limit:g}" if math.isfinite(limit) else "open" for limit in (limits.lower, limits.upper)]
+        stated, value = f"limits ({' to '.join(ends)} {measure.units})", f"{round(nominal, 9) + 0.0:.6g}"
         if limits.outside(np.array(nominal)):
-            yield f"{place}: its nominal value {_number(nominal)} is outside of its {stated}; {_cause(program, k, nominal)}"
+            yield f"{place}: its nominal value {value} is outside of its {stated}; {_cause(program, k, nominal)}"
             continue
         values = draws.measured[np.isfinite(draws.measured[:, k]), k]
         sigma = float(spread(values)) if len(values) else 0.0
-        if sigma > 0 and limits.upper - limits.lower < NEAR_SIGMAS * sigma:
-            yield (
-                f"{place}: its {stated} are {(limits.upper - limits.lower) / sigma:.2g} sigma wide; check their units, and the "
-                "units of the tolerances"
-            )
-            continue
         distance = min(side for side in (nominal - limits.lower, limits.upper - nominal) if math.isfinite(side))
-        if MIN_SHARE * distance < sigma and distance > FAR_SIGMAS * sigma + pushed:
+        if sigma > 0 and width < NEAR_SIGMAS * sigma:
             yield (
-                f"{place}: its {stated} are {distance / sigma:.2g} sigma away from its nominal value {_number(nominal)}; check "
+                f"{place}: its {stated} are {width / sigma:.2g} sigma wide; check their units, and the units of the tolerances"
+            )
+        elif MIN_SHARE * distance < sigma and distance > FAR_SIGMAS * sigma + pushed:
+            yield (
+                f"{place}: its {stated} are {distance / sigma:.2g} sigma away from its nominal value {value}; check "
                 "their units, and the units of the tolerances"
             )
 
 
 def _cause(program: Program, k: int, value: float) -> str:
     """Return the likely cause of the limits of measure k that exclude its nominal value."""
-    measure = program.nominal.measures[k]
-    limits = program.limits(k)
+    measure, limits = program.nominal.measures[k], program.limits(k)
     if measure.units == "rad" and limits.lower <= math.degrees(value) <= limits.upper:
         return "they are probably in degrees: write tc.degrees(...) around each limit"
     if not isinstance(measure.of, Point) or measure.along is None:
@@ -180,14 +157,6 @@ def _cause(program: Program, k: int, value: float) -> str:
     if lower <= -value <= upper:
         return "it has the opposite sign: turn along, or exchange the points"
     return "check the limits, and the places of the parts"
-
-
-def _number(value: float) -> str:
-    return f"{round(value, 9) + 0.0:.6g}"
-
-
-def _side(limit: float) -> str:
-    return f"{limit:g}" if math.isfinite(limit) else "open"
 
 
 def assumed_sides(draws: TrialDraws) -> Iterator[str]:
@@ -233,9 +202,8 @@ def _doubts(measure: Measure, clearance: MeshClearance, X: np.ndarray) -> Iterat
     motion = np.linalg.norm(moved[0] - moved[1], axis=2).max(axis=1)
     spare = (clearance.elements.horizon - float(np.linalg.norm(clearance.lines[0, 1] - clearance.lines[0, 0]))) / 2
     if count := int((motion > spare).sum()):
-        place = measure.designation
         yield (
-            f"{place}: its faces move by more than {spare:.3g} mm in {count} of {len(motion)} draws "
+            f"{measure.designation}: its faces move by more than {spare:.3g} mm in {count} of {len(motion)} draws "
             "without contact; triangles that are not compared may then be nearer, so the clearance is only a lower bound; "
             "choose smaller faces, or read the parts with a larger chord"
         )

@@ -25,15 +25,13 @@ def pair_overlaps(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each contact pair whose faces penetrate each other in nearly every realization."""
     for k, pair, noise in _face_pairs(draws):
         gaps = draws.nominal_gaps(k)
-        deepest = int(gaps.argmin())
-        if gaps[deepest] < -noise:
-            varying = draws.gaps(k, np.array([deepest]))[:, 0]
+        if gaps.min() < -noise:
+            varying = draws.gaps(k, np.array([gaps.argmin()]))[:, 0]
             sigma = float(spread(varying))
             if float(np.median(varying)) + SIGMAS * sigma < 0:
                 yield (
-                    f"{_place(draws, k)}: its faces overlap by {-gaps[deepest]:.3g} mm in the nominal assembly, far beyond "
-                    f"what varies there (3 sigma {SIGMAS * sigma:.2g} mm); check the places and sizes of "
-                    f'"{_name(draws, pair.moving)}" and "{_name(draws, pair.reference)}"'
+                    f"{_place(draws, k)}: its faces overlap by {-gaps.min():.3g} mm in the nominal assembly, far beyond "
+                    f"what varies there (3 sigma {SIGMAS * sigma:.2g} mm); check the places and sizes of {_sides(draws, pair)}"
                 )
 
 
@@ -71,7 +69,7 @@ def pair_clearances(draws: TrialDraws) -> Iterator[str]:
             yield (
                 f"{_place(draws, k)}: its faces are {nominal:.3g} mm apart in the nominal assembly, and vary by "
                 f"{SIGMAS * sigma:.2g} mm (3 sigma), so they never touch; check the places of "
-                f'"{_name(draws, pair.moving)}" and "{_name(draws, pair.reference)}", or leave the pair out'
+                f"{_sides(draws, pair)}, or leave the pair out"
             )
 
 
@@ -84,10 +82,8 @@ def coarse_pairs(draws: TrialDraws) -> Iterator[str]:
     for k, pair in enumerate(nominal.pairs):
         if pair.sampling_error is None:
             continue
-        scene = next(
-            scene for scene in nominal.scenes or (nominal,) if any(pair.name == other.name for other in scene.assembly.pairs)
-        )
-        finest = scene.assembly.smallest_zone()
+        scenes = nominal.scenes or (nominal,)
+        finest = next(s.assembly for s in scenes if pair.name in [other.name for other in s.assembly.pairs]).smallest_zone()
         for error, place, advice in (
             (pair.sampling_error, "between its contact points", "give it more points, or leave points and spacing out"),
             (pair.facets, "between flat triangles and the round faces that they approximate", "use a finer mesh"),
@@ -181,8 +177,8 @@ def _place(draws: TrialDraws, k: int) -> str:
     return next(pair for pair in draws.program.nominal.assembly.pairs if pair.name == name).designation
 
 
-def _name(draws: TrialDraws, part: int | None) -> str:
-    return draws.program.nominal.parts[part or 0].name
+def _sides(draws: TrialDraws, pair: ContactPoints) -> str:
+    return " and ".join(f'"{draws.program.nominal.parts[part or 0].name}"' for part in (pair.moving, pair.reference))
 
 
 def unsure_seats(draws: TrialDraws) -> Iterator[str]:

@@ -59,9 +59,9 @@ class TrialDraws:
         pair = self.program.nominal.pairs[k]
         if not pair.samples_faces:
             return pair_search(self.program, k).gaps(X_RM, deviations, points)
-        chosen_points = np.arange(len(pair.P_m)) if points is None else points
-        gaps = pair.nominal_gaps(X_RM, chosen_points) - pair.heights(deviations)[:, None]
-        return gaps - pair.form_heights(deviations, chosen_points)
+        points = np.arange(len(pair.P_m)) if points is None else points
+        gaps = pair.nominal_gaps(X_RM, points) - pair.heights(deviations)[:, None]
+        return gaps - pair.form_heights(deviations, points)
 
     @cached_property
     def clashes(self) -> list[Clash]:
@@ -81,11 +81,8 @@ class TrialDraws:
     @cached_property
     def pushes(self) -> list[float]:
         """The displacement [mm] of parts that contact of each pair, and forces, may cause."""
-        presses = self.program.method.minimizes.presses
-        return [
-            push(pair, self.relative[:, k], self.deviations, presses=presses)
-            for k, pair in enumerate(self.program.nominal.pairs)
-        ]
+        presses, pairs = self.program.method.minimizes.presses, self.program.nominal.pairs
+        return [push(pair, self.relative[:, k], self.deviations, presses=presses) for k, pair in enumerate(pairs)]
 
     def pushed_by_others(self, k: int) -> float:
         """Return the displacement [mm] of its parts that the other contact of the group of pair k may cause."""

@@ -1,7 +1,6 @@
 """Pictures of assemblies and displacement fields by pyvista, which also draws without a display."""
 
-from collections.abc import Iterator
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -26,12 +25,7 @@ MIN_EDGE_ANGLE = 25.0  # degrees: sharper edges are drawn
 VIEWPOINT = (-1.0, -2.4, 1.5)  # the direction from the assembly to the viewer
 
 
-class _Body(NamedTuple):
-    """A body in its nominal pose [mm]."""
-
-    name: str
-    vertices: np.ndarray
-    faces: np.ndarray
+_Body = tuple[np.ndarray, np.ndarray]  # vertices in the nominal pose [mm], and triangles
 
 
 def assembly(
@@ -52,15 +46,16 @@ def assembly(
     """
     is_new = plotter is None
     plotter = _new_plotter() if is_new else plotter
-    bodies, annotations = _declared(source) if isinstance(source, Assembly) else (list(_bodies(source)), marks_of(source))
-    for number, body in enumerate(bodies):
-        mesh = _mesh(body)
+    bodies, annotations = _declared(source) if isinstance(source, Assembly) else (_bodies(source), marks_of(source))
+    for number, (vertices, faces) in enumerate(bodies):
+        mesh = pv.make_tri_mesh(vertices, faces)
         if realization is not None:
-            mesh.points = _moved(source, number, realization, state, body.vertices)
+            mesh.points = _moved(source, number, realization, state, vertices)
         plotter.add_mesh(mesh, color=GREYS[number % len(GREYS)], opacity=opacity, ambient=AMBIENT, diffuse=1 - AMBIENT)
         _add_edges(plotter, mesh)
     if marks:
-        _add_marks(plotter, annotations, _size(bodies))
+        extent = np.ptp(np.concatenate([vertices for vertices, _ in bodies]), axis=0)
+        _add_marks(plotter, annotations, float(np.linalg.norm(extent)))
     return _in_view(plotter) if is_new else plotter
 
 
@@ -95,7 +90,7 @@ def field(
     plotter = _new_plotter() if is_new else plotter
     title = f"{statistic} of displacement, {component} [mm]\n"
     for body, array in zip(_bodies(results), fields, strict=True):
-        mesh = _mesh(body)
+        mesh = pv.make_tri_mesh(*body)
         mesh["field"] = array.sel({terms.STATE: state}).values
         plotter.add_mesh(
             mesh, scalars="field", clim=(float(low), float(high)), cmap=DIVERGING if is_signed else SEQUENTIAL, lighting=False,
@@ -120,21 +115,16 @@ def _in_view(plotter: Any) -> Any:
 
 def _groups(results: xr.DataTree) -> list[xr.Dataset]:
     names = results.to_dataset()[terms.PART].values
-    return [results["field"].children[terms.group_of(str(name))].to_dataset() for name in names]
+    return [results[terms.field_of(str(name))].to_dataset() for name in names]
 
 
-def _bodies(results: xr.DataTree) -> Iterator[_Body]:
-    for name, group in zip(results.to_dataset()[terms.PART].values, _groups(results), strict=True):
-        yield _Body(str(name), group[terms.FIELD_VERTICES.name].values, group[terms.FIELD_FACES.name].values)
+def _bodies(results: xr.DataTree) -> list[_Body]:
+    return [(group[terms.FIELD_VERTICES.name].values, group[terms.FIELD_FACES.name].values) for group in _groups(results)]
 
 
 def _declared(model: Assembly) -> tuple[list[_Body], Marks]:
     nominal = discretize(model)
-    return [_Body(part.name, part.vertices, part.faces) for part in nominal.last_parts], marks_of_nominal(nominal)
-
-
-def _mesh(body: _Body) -> Any:
-    return pv.make_tri_mesh(body.vertices, body.faces)
+    return [(part.vertices, part.faces) for part in nominal.last_parts], marks_of_nominal(nominal)
 
 
 def _moved(results: xr.DataTree | Assembly, part: int, realization: int, state: str, vertices: np.ndarray) -> np.ndarray:
@@ -149,10 +139,6 @@ def _moved(results: xr.DataTree | Assembly, part: int, realization: int, state: 
     at = {terms.REALIZATION: realization, terms.STATE: terms.STATES.index(state), terms.PART: part}
     R, t = (rows[variable.name].isel(at).values for variable in (terms.ROTATION, terms.TRANSLATION))
     return vertices @ R.T + t
-
-
-def _size(bodies: list[_Body]) -> float:
-    return float(np.linalg.norm(np.ptp(np.concatenate([body.vertices for body in bodies]), axis=0)))
 
 
 def _add_edges(plotter: Any, mesh: Any) -> None:

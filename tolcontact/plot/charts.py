@@ -39,7 +39,10 @@ def histogram(
     measure with NaN values.
     """
     rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
-    place = _place(rows, measure)
+    names = [str(label) for label in rows[terms.MEASURE].values]
+    if measure is not None or len(names) != 1:
+        check_choice("measure", measure, names)
+    place = names.index(str(measure)) if measure is not None else 0
     column = rows.isel({terms.MEASURE: place})
     if not states or not set(states) <= set(terms.STATES):
         raise OptionError(f"states are {list(states)}; expected some of: {', '.join(terms.STATES)}")
@@ -58,25 +61,11 @@ def histogram(
         if sigma > 0:
             z = np.linspace(-CURVE_SIGMAS, CURVE_SIGMAS, 161)
             height = 100 * (edges[1] - edges[0]) / (sigma * math.sqrt(2 * math.pi))
-            axes.plot(
-                mean + sigma * z,
-                height * np.exp(-(z**2) / 2),
-                ":",
-                color=COLOURS[state],
-                label=f"normal, {terms.WORD_OF_STATE[state]}",
-            )
+            label = f"normal, {terms.WORD_OF_STATE[state]}"
+            axes.plot(mean + sigma * z, height * np.exp(-(z**2) / 2), ":", color=COLOURS[state], label=label)
     for limit in limits(rows)[place][:2]:
         if math.isfinite(limit):
             axes.axvline(limit, color=LIMIT_COLOUR, label="_limit")
     axes.set(xlabel=f"{name} [{units}]", ylabel="% of realizations", title=results.attrs.get("title", ""))
     axes.legend(frameon=False)
     return axes
-
-
-def _place(rows: xr.Dataset, name: str | None) -> int:
-    """Return the index of a measure; without a name, the index of the only one."""
-    names = [str(label) for label in rows[terms.MEASURE].values]
-    if name is None and len(names) == 1:
-        return 0
-    check_choice("measure", name, names)
-    return names.index(str(name))

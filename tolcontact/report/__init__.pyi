@@ -1,12 +1,10 @@
-from .analysis_tables import analysis_text as analysis_text
-from .brief import brief_lines as brief_lines
+from .analysis_tables import analysis_text as analysis_text, brief_lines as brief_lines
 from .comparison_text import comparison_text as comparison_text, runs_text as runs_text
-from .figures import grouped as grouped
-from .html import (
+from .html.guide import write_guide as write_guide
+from .html.page import (
     is_page as is_page,
     nominal_and_faults as nominal_and_faults,
     write_comparison as write_comparison,
-    write_guide as write_guide,
     write_page as write_page,
     write_view as write_view,
 )
@@ -14,3 +12,4 @@ from .notebook import results_html as results_html
 from .results_table import has_no_verdict as has_no_verdict
 from .spreadsheet import write_spreadsheet as write_spreadsheet
 from .summary_text import capability_text as capability_text, summary_text as summary_text
+from .table import grouped as grouped

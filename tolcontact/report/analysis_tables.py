@@ -1,8 +1,8 @@
 """Tables of analyses, the same for the terminal and the page; one function per analysis makes them from its dataset."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -11,34 +11,16 @@ from rich.text import Text
 
 from tolcontact import vocabulary as terms
 from tolcontact.limits import GAP_ACCURACY
-from tolcontact.report.figures import grouped, number, percent, share
-from tolcontact.report.stack_tables import stack_up_report
-from tolcontact.report.sweep_tables import sweep_report
-from tolcontact.report.table import Table
+from tolcontact.report import stack_tables
+from tolcontact.report.stack_tables import lost_realizations, unresolved
+from tolcontact.report.table import AnalysisReport, Table, by_measure, grouped, number, percent
 
+BRIEF_TABLES, BRIEF_ROWS = 10, 4  # of a coarse answer in brief: the first tables, and the rows of each that a line has
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are only counted
-AT_END = 1.001  # times the smallest factor of a tolerance: below this, it is as small as permitted
 MAX_HOLDERS = 3  # of a part, in a table
 FEW_NAMES = 3  # of features in a note
 FEW_SEARCHES = 0.25  # of all: if no more than this share end at a value, a remark states that there may be worse ones
-
-
-@dataclass(frozen=True)
-class AnalysisReport:
-    """The report of an analysis for readers.
-
-    name     prefix of the titles of its tables on a page
-    count    the simulated realizations, in words
-    notes    lines that explain the tables
-    main     the most important column of the tables
-    """
-
-    name: str
-    count: str
-    notes: Sequence[str]
-    tables: Sequence[Table]
-    main: int = 1
 
 
 def analysis_report(record: terms.AnalysisRecord, dataset: xr.Dataset) -> AnalysisReport:
@@ -57,21 +39,23 @@ def analysis_text(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Group:
     return Group(title, *map(Text, report.notes), *report.tables)
 
 
-def _lost(count: int) -> list[str]:
-    return [f"{grouped(count)} realizations were not resolved; their last poses are included"] if count else []
-
-
-def _unresolved(dataset: xr.Dataset) -> int:
-    return int(dataset["by_status"].values[list(terms.UNRESOLVED)].sum())
-
-
-def _ppm(values: np.ndarray, *, sign: bool = False) -> str:
-    return number(1e6 * np.asarray(values), sign=sign, max_decimals=0).replace(" [", " ppm [")
+def brief_lines(record: terms.AnalysisRecord, dataset: xr.Dataset) -> Iterator[str]:
+    """Yield a coarse answer in brief: what it rests on, and the first rows of its first tables."""
+    report = analysis_report(record, dataset)
+    yield f"{report.name.lower()} {dataset.attrs[terms.COARSE]}"
+    tables = [table for table in report.tables if len(table.columns) > report.main and (table.title or len(report.tables) == 1)]
+    for table in tables[:BRIEF_TABLES]:
+        rows = [[cell for cell in (row[0], row[report.main], *row[1:]) if cell != "-"][:2] for row in table.rows[:BRIEF_ROWS]]
+        known = "; ".join(" ".join(row) for row in rows if len(row) > 1)
+        yield f"  {table.title}: " * bool(table.title) + (known or "not known yet")
 
 
 def _contributions(dataset: xr.Dataset) -> AnalysisReport:
-    notes = ["Shares of variance: alone, and in total, together with others; 95 % intervals.", *_lost(_unresolved(dataset))]
-    tables = [table for measure in dataset["measure"].values for table in _shares(dataset.sel(measure=measure))]
+    notes = [
+        "Shares of variance: alone, and in total, together with others; 95 % intervals.",
+        *lost_realizations(unresolved(dataset)),
+    ]
+    tables = [table for measure in by_measure(dataset) for table in _shares(measure)]
     return AnalysisReport("Contributions", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables, main=3)
 
 
@@ -89,13 +73,9 @@ def _shares(dataset: xr.Dataset) -> Iterator[Table]:
             continue
         shares = dataset.isel(group=group)
         # Without contact, measures are nearly additive: first-order and total shares hardly differ.
-        cells = [
-            _share(shares["total"].isel(state=terms.RAW)),
-            _share(shares["first"].isel(state=terms.CORRECTED)),
-            _share(shares["total"].isel(state=terms.CORRECTED)),
-        ]
-        linear = float(shares["linear"])
-        rows.append([str(shares["group"].values), *cells, f"{100 * linear:.1f} %" if math.isfinite(linear) else "-"])
+        cells = shares["total"][terms.RAW], shares["first"][terms.CORRECTED], shares["total"][terms.CORRECTED]
+        linear = f"{100 * float(shares['linear']):.1f} %" if math.isfinite(shares["linear"]) else "-"
+        rows.append([str(shares["group"].values), *map(_share, cells), linear])
     if not np.isfinite(dataset["linear"].values).any():
         missed.append("no linear shares: it has a kink in the assembly as drawn, or no slope there")
     small = dataset.sizes["group"] - len(rows)
@@ -108,12 +88,11 @@ def _shares(dataset: xr.Dataset) -> Iterator[Table]:
         yield Table(measure, columns, rows, [*remarks, *missed], is_detail=True)
         return
     yield Table(measure, columns, rows, remarks, is_detail=True)
-    effects = dataset["shapley"].sel(interval="estimate")
-    rows = [
-        [str(dataset["unit"].values[k]), *(_share(dataset["shapley"].sel(state=s).isel(unit=k)) for s in terms.STATES)]
-        for k in _by_size(dataset["shapley"])
-        if not abs(float(effects.isel(unit=k).max())) < SMALL_SHARE
-    ]
+    rows = []
+    for k in _by_size(dataset["shapley"]):
+        effects = dataset["shapley"].isel(unit=k)
+        if not abs(float(effects.sel(interval="estimate").max())) < SMALL_SHARE:
+            rows.append([str(dataset["unit"].values[k]), *map(_share, effects)])
     title = f"{measure}: Shapley effects, which divide what is correlated"
     yield Table(title, ["", *terms.STATE_WORDS], rows, missed, is_detail=True)
 
@@ -133,9 +112,9 @@ def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
         "Mean derivatives with 95 % intervals: over realizations without contact, and",
         "over realizations with contact, both without kinks and jumps;",
         '"all" includes kinks and jumps, and "kinks" is their share.',
-        *_lost(_unresolved(dataset)),
+        *lost_realizations(unresolved(dataset)),
     ]
-    tables = [_slopes(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
+    tables = [_slopes(measure) for measure in by_measure(dataset)]
     leverage = dataset["leverage"].values
     order = [k for k in np.argsort(-leverage, kind="stable") if np.isfinite(leverage[k])]
     if order:
@@ -156,12 +135,11 @@ def _slopes(dataset: xr.Dataset) -> Table:
         if not size[k] > SMALL_SLOPE * np.nanmax(size):
             continue
         slopes = dataset.isel(contributor=int(k))
-        by_contact = [number(slopes["by_contact"].sel(contact=contact).values) for contact in terms.CONTACT_STATES]
-        corrected = number(slopes["sensitivity"].isel(state=terms.CORRECTED).values)
-        spread, slope = f"{float(slopes['spread'][terms.CORRECTED]):.2g}", float(slopes["nominal"])
-        nominal = f"{slope:.3g}" if math.isfinite(slope) else "kink"
-        kinks = percent(slopes["changing"].values)
-        rows.append([str(slopes["contributor"].values), nominal, *by_contact, corrected, spread, kinks])
+        means = [slopes["by_contact"].sel(contact=contact).values for contact in terms.CONTACT_STATES]
+        means.append(slopes["sensitivity"].isel(state=terms.CORRECTED).values)
+        nominal = f"{float(slopes['nominal']):.3g}" if math.isfinite(slopes["nominal"]) else "kink"
+        spread, kinks = f"{float(slopes['spread'][terms.CORRECTED]):.2g}", percent(slopes["changing"].values)
+        rows.append([str(slopes["contributor"].values), nominal, *map(number, means), spread, kinks])
     small = dataset.sizes["contributor"] - len(rows)
     title = f"{dataset['measure'].values} ({dataset['measure_units'].values} for a unit of each)"
     columns = ["", "nominal", "apart", "touching", "all", "spread", "kinks"]
@@ -186,7 +164,7 @@ def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
             notes.append(f"{grouped(int(counts[status]))} combinations are {meaning}; they do not count")
     if counts[terms.Status.NOT_ASSEMBLABLE]:
         notes.append("So the drawings allow parts that do not go together.")
-    tables = [table for measure in dataset["measure"].values for table in _extremes(dataset.sel(measure=measure))]
+    tables = [table for measure in by_measure(dataset) for table in _extremes(measure)]
     return AnalysisReport("Worst cases", f"{grouped(int(counts.sum()))} combinations", notes, tables)
 
 
@@ -196,9 +174,8 @@ def _extremes(dataset: xr.Dataset) -> Iterator[Table]:
     for state in terms.STATES:
         for end, word in terms.WORD_OF_END.items():
             extreme = dataset.sel(state=state, end=end)
-            found, linear = float(extreme["worst"]), float(extreme["bound"])
-            cells = [f"{found:.6g}", f"{linear:.6g}" if math.isfinite(linear) else "no limit"]
-            cells.append(f"{int(extreme['agreeing'])} of {searches}")
+            linear = f"{float(extreme['bound']):.6g}" if math.isfinite(extreme["bound"]) else "no limit"
+            cells = [f"{float(extreme['worst']):.6g}", linear, f"{int(extreme['agreeing'])} of {searches}"]
             rows.append([f"{word}, {terms.WORD_OF_STATE[state]}", *cells])
     remarks = []
     beyond = float((np.array(terms.SENSES) * (dataset["worst"] - dataset["bound"]).values).max())
@@ -239,78 +216,6 @@ def _tails(dataset: xr.Dataset) -> AnalysisReport:
     return AnalysisReport("Rare events", count, notes, [Table("", ["", "ppm"], rows)])
 
 
-def _allocation(dataset: xr.Dataset) -> AnalysisReport:
-    requirements = []
-    for name, values in zip(dataset["requirement"].values, dataset["kept"].values, strict=True):
-        requirements.append([str(name), *map(share if f": {terms.PPM}" in str(name) else number, values)])
-    ranges = []
-    for group in dataset["group"].values:
-        row = dataset.sel(group=group)
-        widths = [f"{width:.4g}" if math.isfinite(width) else "several" for width in row["range"].values]
-        ranges.append([str(group), *widths, f"{float(row['factor']):.3g}", _remark_on(row, dataset.attrs)])
-    before, after = dataset["cost"].sum("group").values
-    tables = [
-        Table("", ["required", *terms.STAGES], requirements),
-        Table(f"Cost {before:.4g} before, {after:.4g} after", ["tolerance", *terms.STAGES, "factor", ""], ranges),
-        *(_effects(dataset["effect"].sel(measure=measure)) for measure in dataset["measure"].values),
-    ]
-    notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals."]
-    least, most = (f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling"))
-    notes.append(f"Tolerances may be {least} (smallest allowed) to {most} (largest allowed) those before.\n")
-    if choices := dataset.attrs.get("choices"):
-        notes.append(f"Choices: {choices}.\n")
-    if dataset["idle"].values.any():
-        count = dataset.attrs["idle_tried"]
-        notes.append(
-            f"No influence: with all of these tolerances together at {least} or {most} those before, none of {grouped(count)} "
-            f"resolved realizations changed. So at most {3 / count:.2g} of them do, with 95 % confidence.\n"
-        )
-    for (name, _, after), is_met in zip(requirements, dataset["met"].values, strict=True):
-        if not is_met:
-            notes.append(f'"{name}": no tolerances were found whose 95 % interval keeps it; the best: {after}.\n')
-    return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
-
-
-def _remark_on(row: xr.Dataset, attributes: dict) -> str:
-    """Return why a tolerance did not change further, if there is a reason."""
-    if int(row["idle"]):
-        return "no influence"
-    factor = float(row["factor"])
-    at_floor, at_ceiling = factor <= attributes["floor"] * AT_END, factor * AT_END >= attributes["ceiling"]
-    return "smallest allowed" if at_floor else "largest allowed" if at_ceiling else ""
-
-
-def _effects(effect: xr.DataArray) -> Table:
-    """Return the effects (of_effect, group, interval) on a measure, starting with the largest one."""
-    rows = []
-    for k in np.argsort(effect.values[0, :, 0], kind="stable"):
-        spread, outside = effect.values[:, k]
-        rows.append([str(effect["group"].values[k]), number(spread, sign=True), _ppm(outside, sign=True)])
-    title = f"{effect['measure'].values} [{effect['measure_units'].values}]: changes if zones were a tenth narrower than before"
-    return Table(title, ["", *terms.EFFECTS], rows)
-
-
-def _relocation(dataset: xr.Dataset) -> AnalysisReport:
-    statistic = dataset.attrs["least"]
-    is_share = statistic.endswith(terms.PPM)
-    text = share if is_share else number
-    rows = []
-    for stage, point, reached in zip(terms.STAGES, dataset["point"].values, dataset["reached"].values, strict=True):
-        rows.append([f"{stage}: ({', '.join(f'{c:.4g}' for c in point)})", text(reached)])
-    change = dataset["change"].values
-    rows.append(["after minus before", _ppm(change, sign=True)] if is_share else ["after / before", number(change)])
-    columns = [dataset.attrs["locator"], statistic if is_share else f"{statistic} [{dataset['measure_units'].values}]"]
-    samples, fresh = (grouped(dataset.attrs[word]) for word in ("samples", "fresh"))
-    notes = [
-        f"{samples} realizations for each trial position;",
-        f"{fresh} fresh ones for the figures below, with 95 % intervals.\n",
-    ]
-    before, after = dataset["point"].values
-    stays = ["No position between the corners is better: the locator stays where it is.\n"] * bool((before == after).all())
-    table = Table("", columns, rows, _lost(int(dataset["unresolved"].max())))
-    return AnalysisReport("Position of a locator", f"{grouped(dataset.sizes['trial'])} trial positions", notes + stays, [table])
-
-
 def _seating(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
         "Least coefficient of friction, the same at all other contacts, that can hold",
@@ -320,30 +225,27 @@ def _seating(dataset: xr.Dataset) -> AnalysisReport:
     ]
     if dataset.attrs["open_pairs"]:
         notes.append(f"They do not touch there, so they hold nothing: {dataset.attrs['open_pairs']}.")
-    rows = [_seat(dataset.isel(seat=k)) for k in range(dataset.sizes["seat"])]
+    rows = []
+    for seat in range(dataset.sizes["seat"]):
+        critical, reserve, shares = (dataset[name].values[seat] for name in ("critical", "reserve", "share"))
+        holders = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SMALL_SHARE and critical > 0]
+        names = [f"{dataset['holder'].values[k]} {100 * shares[k]:.0f} %" for k in holders[:MAX_HOLDERS]]
+        names += [f"and {len(holders) - MAX_HOLDERS} more"] if len(holders) > MAX_HOLDERS else []
+        warning = ", may stop short" if 0 < critical and reserve <= 1 else ""
+        factor = "-" if np.isnan(reserve) else f"{float(reserve):.3g}{warning}"
+        rows.append([str(dataset["seat"].values[seat]), f"{float(critical):.4g}", factor, ",\n".join(names)])
     columns = ["", "critical", "reserve", "held by"]
     return AnalysisReport("Seating", f"{len(rows)} seats", notes, [Table("", columns, rows)])
 
 
-def _seat(dataset: xr.Dataset) -> list[str]:
-    """Return the row of a seat, starting with the contacts that have the largest shares."""
-    critical, reserve, shares = (dataset[name].values for name in ("critical", "reserve", "share"))
-    holders = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SMALL_SHARE and critical > 0]
-    names = [f"{dataset['holder'].values[k]} {100 * shares[k]:.0f} %" for k in holders[:MAX_HOLDERS]]
-    names += [f"and {len(holders) - MAX_HOLDERS} more"] if len(holders) > MAX_HOLDERS else []
-    warning = ", may stop short" if 0 < critical and reserve <= 1 else ""
-    factor = "-" if np.isnan(reserve) else f"{float(reserve):.3g}{warning}"
-    return [str(dataset["seat"].values), f"{float(critical):.4g}", factor, ",\n".join(names)]
-
-
 _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
-    terms.STACK_UP.name: lambda dataset: AnalysisReport(*stack_up_report(dataset, _lost(_unresolved(dataset)))),
+    terms.STACK_UP.name: stack_tables.stack_up_report,
     terms.CONTRIBUTIONS.name: _contributions,
     terms.SENSITIVITIES.name: _sensitivities,
     terms.WORST_CASE.name: _worst_case,
     terms.TAILS.name: _tails,
-    terms.ALLOCATION.name: _allocation,
-    terms.RELOCATION.name: _relocation,
+    terms.ALLOCATION.name: stack_tables.allocation_report,
+    terms.RELOCATION.name: stack_tables.relocation_report,
     terms.SEATING.name: _seating,
-    terms.SWEEP.name: lambda dataset: AnalysisReport(*sweep_report(dataset, _lost(_unresolved(dataset.sum("position"))))),
+    terms.SWEEP.name: stack_tables.sweep_report,
 }

@@ -1,6 +1,6 @@
 """Annotations of an assembly in its nominal frame [mm]: locators, contact points, measures, features and forces."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,32 +39,45 @@ class Marks:
 def marks_of(results: xr.DataTree) -> Marks:
     """Return the annotations that an archive has."""
     document = declaration_of(results)
+    sample, contact = results["sample"].to_dataset(), results["contact"].to_dataset()
+    points, directions = sample[terms.LOCATOR_POINT.name].values, sample[terms.LOCATOR_DIRECTION.name].values
+    features = []
+    if terms.FACE_CENTRE.name in contact:
+        features = _named(contact[terms.FEATURE_OF_FACE.name].values, at=contact[terms.FACE_CENTRE.name].values)
     try:
         forces = [
             {"name": force["name"], "at": _at(document, force["at"]), "along": force["vector"]} for force in document["forces"]
         ]
-        measures = list(_measures(document, *_lines(results)))
+        measures = list(_measures(document, results["model"].to_dataset()))
     except (LookupError, TypeError, ValueError, RuntimeError) as error:  # no run wrote it: its checksum was forged
         raise ArchiveError(f"the declared model in the archive is damaged: {type(error).__name__}: {error}") from error
-    return Marks(_locators(results), list(_contacts(results)), measures, _features(results), forces)
+    contacts: list[Mark] = []
+    if terms.MOVING_POINT.name in contact:
+        places, pairs = contact[terms.MOVING_POINT.name].values, contact[terms.PAIR_OF_POINT.name].values
+        names = zip(results.to_dataset()[terms.PAIR].values, contact[terms.MOVING_PART.name].values.tolist(), strict=True)
+        contacts = [
+            {"name": str(name), "part": moving, "points": places[pairs == k], "gaps": None}
+            for k, (name, moving) in enumerate(names)
+        ]
+    locators = _named(sample[terms.LOCATOR].values, at=points, along=directions)
+    return Marks(locators, contacts, measures, features, forces)
 
 
 def marks_of_nominal(nominal: Nominal) -> Marks:
     """Return the annotations of a model before a run."""
-    locators = zip(nominal.locators.labels, nominal.locators.points, nominal.locators.directions, strict=True)
     contacts = []
     for pair in nominal.pairs:
         points, gaps = fixed_points(pair)
         contacts.append({"name": pair.name, "part": pair.moving, "points": points, "gaps": gaps})
     return Marks(
-        [{"name": name, "at": at.tolist(), "along": along.tolist()} for name, at, along in locators],
+        _named(nominal.locators.labels, at=nominal.locators.points, along=nominal.locators.directions),
         contacts,
         [
             _measure(measure.name, measure.along, [_position(nominal, point) for point in measure.points], lines)
             for measure, lines in zip(nominal.measures, nominal.lines, strict=True)
             if measure.points or len(lines)
         ],
-        [{"name": face.name, "at": face.centre.tolist()} for face in nominal.faces],
+        _named([face.name for face in nominal.faces], at=[face.centre for face in nominal.faces]),
         [
             {"name": force.name, "at": _position(nominal, force.at), "along": list(force.vector)}
             for force in nominal.assembly.forces
@@ -72,47 +85,20 @@ def marks_of_nominal(nominal: Nominal) -> Marks:
     )
 
 
+def _named(names: Iterable[str], **arrays: Iterable[np.ndarray]) -> list[Mark]:
+    rows = zip(names, *arrays.values(), strict=True)
+    return [{"name": str(name), **{key: x.tolist() for key, x in zip(arrays, row, strict=True)}} for name, *row in rows]
+
+
 def fixed_points(pair: ContactPoints) -> tuple[np.ndarray, np.ndarray]:
     """Return contact points (point, 3) and gaps (point,) [mm], except on nearest tangents of hollow walls, which move."""
     return pair.P_m[pair.stays], pair.nominal_gaps(pose.AT_REST[None])[0, pair.stays]
 
 
-def _locators(results: xr.DataTree) -> list[Mark]:
-    sample = results["sample"].to_dataset()
-    points, directions = sample[terms.LOCATOR_POINT.name].values, sample[terms.LOCATOR_DIRECTION.name].values
-    return [
-        {"name": str(name), "at": at.tolist(), "along": along.tolist()}
-        for name, at, along in zip(sample[terms.LOCATOR].values, points, directions, strict=True)
-    ]
-
-
-def _contacts(results: xr.DataTree) -> Iterator[Mark]:
-    contact = results["contact"].to_dataset()
-    if terms.MOVING_POINT.name not in contact:
-        return
-    points, pair_of_point = contact[terms.MOVING_POINT.name].values, contact[terms.PAIR_OF_POINT.name].values
-    for number, name in enumerate(results.to_dataset()[terms.PAIR].values):
-        moving = int(contact[terms.MOVING_PART.name].values[number])
-        yield {"name": str(name), "part": moving, "points": points[pair_of_point == number], "gaps": None}
-
-
-def _features(results: xr.DataTree) -> list[Mark]:
-    contact = results["contact"].to_dataset()
-    if terms.FACE_CENTRE.name not in contact:
-        return []
-    faces = zip(contact[terms.FEATURE_OF_FACE.name].values, contact[terms.FACE_CENTRE.name].values, strict=True)
-    return [{"name": str(name), "at": at.tolist()} for name, at in faces]
-
-
-def _lines(results: xr.DataTree) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lines (line, 2, 3) that show measurements, and the number of the measure (line,) of each, if there are any."""
-    model = results["model"].to_dataset()
-    if terms.LINE_ENDS.name not in model:
-        return np.zeros((0, 2, 3)), np.zeros(0, dtype=int)
-    return model[terms.LINE_ENDS.name].values, model[terms.MEASURE_OF_LINE.name].values
-
-
-def _measures(document: Mark, lines: np.ndarray, measure_of_line: np.ndarray) -> Iterator[Mark]:
+def _measures(document: Mark, model: xr.Dataset) -> Iterator[Mark]:
+    lines, measure_of_line = np.zeros((0, 2, 3)), np.zeros(0, dtype=int)
+    if terms.LINE_ENDS.name in model:
+        lines, measure_of_line = model[terms.LINE_ENDS.name].values, model[terms.MEASURE_OF_LINE.name].values
     for number, measure in enumerate(document["measures"]):
         declared = [measure[word] for word in ("of", "to") if "part" in (measure.get(word) or {})]
         positions = [end for end in (_at(document, point) for point in declared) if end is not None]

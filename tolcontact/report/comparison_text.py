@@ -1,7 +1,9 @@
-"""Comparisons of runs, and of solvers, as text."""
+"""Comparisons of runs, of their models, and of solvers, as text."""
 
+import json
 import math
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import xarray as xr
 from rich.console import Group
@@ -9,12 +11,14 @@ from rich.text import Text
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.contributor_shares import ContributorShares
-from tolcontact.report.figures import grouped, number, percent, settled
-from tolcontact.report.table import Table
+from tolcontact.report.table import Table, by_measure, grouped, number, percent, settled
+from tolcontact.texts import clipped
 
 VALUES = ("", "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN)
 MAX_CONTRIBUTORS = 5  # of a run
 CHANGES = ("", "shift of mean", "6 sigma", f"{terms.OUT_OF_SPECIFICATION_COLUMN},\npoints", "largest\ndifference")
+IGNORED = "declared_at", "title_block"  # of a model: lines of a script; the title block is stated elsewhere
+MAX_VALUE = 60  # characters of a value of a model
 _DRAWS = {
     terms.SAME_DRAWS: "the same draws; changes are from the same realizations",
     terms.SAME_SEED: "the same seed, but other draws; changes are realization by realization",
@@ -24,19 +28,11 @@ _DRAWS = {
 
 def runs_text(comparison: xr.Dataset) -> Group:
     """Return a comparison (see compare_runs) for rich to print."""
-    return Group(*_sections(comparison))
-
-
-def _sections(comparison: xr.Dataset) -> Iterator[Text | Table]:
-    yield Text(comparison.attrs["title"], style="bold")
-    for line in runs_lines(comparison):
-        yield Text(line)
-    for name in comparison["measure"].values:
-        measure = comparison.sel(measure=name)
-        yield Text(f"\n{name} ({measure['measure_units'].values})", style="bold")
-        yield value_table(measure)
-        yield Text(f"\nchanges from {comparison.attrs['reference_run']}")
-        yield change_table(measure)
+    sections: list[Text | Table] = [Text(comparison.attrs["title"], style="bold"), *map(Text, runs_lines(comparison))]
+    for measure in by_measure(comparison):
+        sections.append(Text(f"\n{measure['measure'].values} ({measure['measure_units'].values})", style="bold"))
+        sections += [value_table(measure), Text(f"\nchanges from {comparison.attrs['reference_run']}"), change_table(measure)]
+    return Group(*sections)
 
 
 def runs_lines(comparison: xr.Dataset) -> Iterator[str]:
@@ -113,3 +109,44 @@ def comparison_text(comparison: xr.Dataset) -> Group:
     reference = comparison.attrs["reference_solver"]
     note = f"In mm (measurements in their own units): residuals, differences from {reference}."
     return Group(Text(heading, style="bold"), Text(note), Text(), Table("", columns, rows))
+
+
+def model_changes(before: Any, after: Any, place: str = "") -> Iterator[str]:
+    """Yield a sentence for each value that differs in two documents of models, such as "cover, H1, width: 0.2, now 0.1"."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        old, new = ({key: value for key, value in model.items() if key not in IGNORED} for model in (before, after))
+        yield from _changes(old, new, place)
+    elif isinstance(before, list) and isinstance(after, list) and any(isinstance(entry, dict) for entry in before + after):
+        yield from _changes(_by_name(before), _by_name(after), place)
+    elif before != after:
+        yield f"{place}: {_shown(before)}, now {_shown(after)}"
+
+
+def _changes(before: dict[str, Any], after: dict[str, Any], place: str) -> Iterator[str]:
+    for key in dict.fromkeys((*before, *after)):
+        where = f"{place}, {key}" if place else key
+        if key not in after:
+            yield f"{where}: removed ({_shown(before[key])})"
+        elif key not in before:
+            yield f"{where}: added ({_shown(after[key])})"
+        else:
+            yield from model_changes(before[key], after[key], where)
+
+
+def _by_name(entries: list[Any]) -> dict[str, Any]:
+    """Return entries by their names, or by their kinds or numbers if they have none."""
+    named: dict[str, Any] = {}
+    for position, entry in enumerate(entries, start=1):
+        labels = [entry.get(key) for key in ("name", "kind", "part")] if isinstance(entry, dict) else []
+        name = next((label for label in labels if isinstance(label, str) and label), "")
+        named[name if name and name not in named else f"{name} {position}".strip()] = entry
+    return named
+
+
+def _shown(value: Any) -> str:
+    """Return a value in a line: the name of a thing, a number without the noise of computing it, or a clipped text."""
+    if isinstance(value, dict) and "name" in value:
+        return str(value["name"])
+    if isinstance(value, float):
+        return f"{value:.12g}"
+    return clipped(value if isinstance(value, str) else json.dumps(value, ensure_ascii=False), MAX_VALUE)

@@ -9,7 +9,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.errors import TolcontactError
 from tolcontact.realizations import declaration_of
-from tolcontact.report.figures import NO_INTERVAL, grouped, percent
+from tolcontact.report.table import NO_INTERVAL, grouped, percent
 from tolcontact.statistics.variance_shares import (
     MIN_EFFECTIVE,
     MIN_R2,
@@ -58,9 +58,8 @@ def shares_or_first_order(
         rows = variances()
     except TolcontactError:  # the model cannot be rebuilt
         return estimated
-    return [
-        _first_order(results, row, shares) if shares.is_open else shares for shares, row in zip(estimated, rows, strict=True)
-    ]
+    pairs = zip(estimated, rows, strict=True)
+    return [_first_order(results, row, shares) if shares.is_open else shares for shares, row in pairs]
 
 
 def _first_order(results: xr.DataTree, variances: np.ndarray, instead: ContributorShares) -> ContributorShares:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import xarray as xr
@@ -11,19 +10,15 @@ from tolcontact import vocabulary as terms
 from tolcontact.arrays import Array, Float
 from tolcontact.errors import TolcontactError
 from tolcontact.realizations import is_assembled
-from tolcontact.report.figures import number, percent
-from tolcontact.report.table import Table
-from tolcontact.statistics.intervals import Estimate, mean, proportion, standard_deviation, variance_ratio
+from tolcontact.report.table import Table, number, percent
+from tolcontact.statistics.intervals import mean, proportion, standard_deviation, variance_ratio
 
 MAX_ROWS = 10_000  # realizations whose reactions are shown
 NO_LOAD, ROUNDING = 1e-4, 1e-9  # of the largest reaction of all: contact that transmits less is open; smaller ones are zero
 
 
-class RigidMeasured(Protocol):
-    """Values with rigid parts (realization, measure), and how these are placed in words."""
-
-    measured: np.ndarray
-    words: str
+# Values with rigid parts (realization, measure), and how these are placed in words.
+RigidMeasured = tuple[Float[Array, "realization measure"], str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,23 +51,14 @@ def reactions_of(results: xr.DataTree) -> list[Reaction]:
     pairs = contact[terms.PAIR_OF_POINT.name].values[points]
     at, along = (contact[variable.name].values[points] for variable in (terms.MOVING_POINT, terms.REFERENCE_NORMAL))
     names, counts = rows[terms.PAIR].values, np.bincount(pairs, minlength=rows.sizes[terms.PAIR])
-    labels = _support_names(results, contact, points)
+    locators, locator_of_point = results["sample"].to_dataset()[terms.LOCATOR].values, contact.get(terms.LOCATOR_OF_POINT.name)
+    supports = np.full(len(points), -1) if locator_of_point is None else locator_of_point.values[points]
     reactions = []
     for k, pair in enumerate(pairs):
         place = "" if counts[pair] == 1 else f" {k - int(np.argmax(pairs == pair)) + 1}"
-        reactions.append(
-            Reaction(labels[k] or f"{names[pair]}{place}", str(names[pair]), at[k], along[k], loads[:, k], not holds[k])
-        )
+        label = str(locators[supports[k]]) if supports[k] >= 0 else f"{names[pair]}{place}"
+        reactions.append(Reaction(label, str(names[pair]), at[k], along[k], loads[:, k], not holds[k]))
     return reactions
-
-
-def _support_names(results: xr.DataTree, contact: xr.Dataset, points: np.ndarray) -> list[str]:
-    """Return the names of the one-sided locators at contact points; empty at others."""
-    locators = results["sample"].to_dataset()[terms.LOCATOR].values
-    if terms.LOCATOR_OF_POINT.name not in contact:
-        return [""] * len(points)
-    numbers = contact[terms.LOCATOR_OF_POINT.name].values[points]
-    return [str(locators[number]) if number >= 0 else "" for number in numbers]
 
 
 def elastic_tables(results: xr.DataTree, rigid: Callable[[], RigidMeasured | None] | None) -> Iterator[Table]:
@@ -91,10 +77,10 @@ def reaction_table(reactions: list[Reaction]) -> Table:
         values = np.where(np.abs(reaction.values) <= ROUNDING * largest, 0.0, reaction.values)
         open_share = percent(proportion(np.abs(values) <= NO_LOAD * largest)) if reaction.is_contact else ""
         place, along = (", ".join(f"{x + 0.0:.4g}" for x in vector.round(9)) for vector in (reaction.at, reaction.along))
-        of_mean, of_spread = (
-            (number(mean(values)), number(standard_deviation(values, times=6.0))) if values.any() else ("0", "0")
-        )
-        rows.append([reaction.name, place, along, of_mean, of_spread, *(f"{x:.4g}" for x in _ends(values)), open_share])
+        figures = [mean(values), standard_deviation(values, times=6.0)] if values.any() else []
+        ends = (values.min(), values.max()) if len(values) else (np.nan, np.nan)
+        texts = [*(map(number, figures) if figures else ("0", "0")), *(f"{x:.4g}" for x in ends)]
+        rows.append([reaction.name, place, along, *texts, open_share])
     columns = ["reaction", "at [mm]", "along", "mean [N]", "6 sigma [N]", "smallest [N]", "largest [N]", "open"]
     remarks = [
         f"Forces on the moving part of each pair, along the stated direction, of {len(reactions[0].values)} realizations, the "
@@ -102,10 +88,6 @@ def reaction_table(reactions: list[Reaction]) -> Table:
         "In the picture of the assembly, arrows are as long as means, and bars reach from the 2.5th to the 97.5th percentile.",
     ]
     return Table("Reactions of elastic parts", columns, rows, remarks)
-
-
-def _ends(values: np.ndarray) -> tuple[float, float]:
-    return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
 
 
 def _in_sum(reactions: list[Reaction]) -> Iterator[Reaction]:
@@ -131,19 +113,19 @@ def variance_table(results: xr.DataTree, rigid: Callable[[], RigidMeasured | Non
     try:
         values = rigid()
     except TolcontactError:
-        return None
+        values = None
     if values is None:
         return None
-    rows = results.to_dataset().isel({terms.REALIZATION: slice(len(values.measured))})
-    is_kept = is_assembled(rows[terms.STATUS.name].values) & np.isfinite(values.measured).all(axis=1)
+    rigid_measured, words = values
+    rows = results.to_dataset().isel({terms.REALIZATION: slice(len(rigid_measured))})
+    is_kept = is_assembled(rows[terms.STATUS.name].values) & np.isfinite(rigid_measured).all(axis=1)
     measured = rows[terms.MEASURED.name].values[is_kept, terms.CORRECTED]
     table = []
     for k, measure in enumerate(rows[terms.MEASURE].values):
-        ratio = variance_ratio(values.measured[is_kept, k], measured[:, k])
-        share = Estimate(1 - ratio.value, 1 - ratio.upper, 1 - ratio.lower)
-        table.append([str(measure), percent(share)])
+        ratio = variance_ratio(rigid_measured[is_kept, k], measured[:, k])
+        table.append([str(measure), percent((1 - ratio.value, 1 - ratio.upper, 1 - ratio.lower))])
     remark = (
-        f"1 - V / W: W is the variance with contact, V that of {values.words}; {int(is_kept.sum())} realizations. "
+        f"1 - V / W: W is the variance with contact, V that of {words}; {int(is_kept.sum())} realizations. "
         "Negative: bending evens deviations out."
     )
     return Table("Variance that elasticity adds", ["measurement", "share of variance"], table, [remark])

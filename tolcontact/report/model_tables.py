@@ -12,8 +12,7 @@ from tolcontact.declaration import Chain, Tolerance, Variable
 from tolcontact.declaration.document import tolerance_of_entry, variable_of_entry
 from tolcontact.errors import ArchiveError
 from tolcontact.realizations import declaration_of
-from tolcontact.report.figures import nominal_and_limits, plain
-from tolcontact.report.table import Cell, Table
+from tolcontact.report.table import Cell, Table, nominal_and_limits, plain
 
 Entry = dict[str, Any]
 SETTINGS = (
@@ -60,7 +59,6 @@ def _dimensions(document: Entry, results: xr.DataTree) -> Table:
 
 
 def _capability(tolerance: Tolerance) -> str:
-    """Return the distribution of a dimension with its capability."""
     name = tolerance.distribution if isinstance(tolerance.distribution, str) else str(tolerance.frozen.dist.name)
     numbers = [f"{key} {value:g}" for key, value in (("cp", tolerance.cp), ("cpk", tolerance.cpk)) if value is not None]
     return ", ".join([name, *numbers])
@@ -78,21 +76,14 @@ def _parts(document: Entry, results: xr.DataTree) -> Table:
 
 
 def _features(document: Entry, results: xr.DataTree) -> Table:
-    rows = [
-        [
-            part["name"],
-            f"{feature['name']} ({len(feature['members'])} members)" if "members" in feature else feature["name"],
-            feature.get("datum") or "",
-            "\n".join(str(tolerance_of_entry(entry)) for entry in feature["tolerances"]),
-        ]
-        for part in document["parts"]
-        for feature in part.get("features", [])
-    ]
-    targets = [
-        [part["name"], f"{len(target['targets'])} datum targets", target["datum"], ""]
-        for part in document["parts"]
-        for target in part.get("datum_targets", [])
-    ]
+    rows, targets = [], []
+    for part in document["parts"]:
+        for feature in part.get("features", []):
+            members = f" ({len(feature['members'])} members)" if "members" in feature else ""
+            tolerances = "\n".join(str(tolerance_of_entry(entry)) for entry in feature["tolerances"])
+            rows.append([part["name"], f"{feature['name']}{members}", feature.get("datum") or "", tolerances])
+        for target in part.get("datum_targets", []):
+            targets.append([part["name"], f"{len(target['targets'])} datum targets", target["datum"], ""])
     return Table("Features, datums and tolerances", ["part", "feature", "datum", "tolerances, mm"], rows + targets)
 
 
@@ -101,7 +92,10 @@ def _locators(document: Entry, results: xr.DataTree) -> Table:
     labels = [str(label) for label in sample[terms.LOCATOR].values]
     numbers = {str(label): k for k, label in enumerate(sample[terms.CONTRIBUTOR].values)}
     rows: list[list[Cell]] = []
-    compliant = _compliant_locators(results["contact"].to_dataset())
+    contact, compliant = results["contact"].to_dataset(), set[int]()
+    if terms.POINT_STIFFNESS.name in contact:
+        gives = np.isfinite(contact[terms.POINT_STIFFNESS.name].values)
+        compliant = set(contact[terms.LOCATOR_OF_POINT.name].values[gives].tolist())
     for k, label in enumerate(labels):
         part, _, name = label.rpartition(".")
         at, along = (sample[v.name].values[k] for v in (terms.LOCATOR_POINT, terms.LOCATOR_DIRECTION))
@@ -115,30 +109,17 @@ def _locators(document: Entry, results: xr.DataTree) -> Table:
     return Table("Locators", columns, rows)
 
 
-def _compliant_locators(contact: xr.Dataset) -> set[int]:
-    """Return the indices of the compliant locators."""
-    if terms.POINT_STIFFNESS.name not in contact:
-        return set()
-    gives = np.isfinite(contact[terms.POINT_STIFFNESS.name].values)
-    return set(contact[terms.LOCATOR_OF_POINT.name].values[gives].tolist())
-
-
 def _pairs(document: Entry, results: xr.DataTree) -> Table:
     contact = results["contact"].to_dataset()
     counts = np.zeros(0, dtype=int)
     if terms.PAIR_OF_POINT.name in contact:
         counts = np.bincount(contact[terms.PAIR_OF_POINT.name].values, minlength=len(document["pairs"]))
     gives = any("stiffness" in pair for pair in document["pairs"])
-    rows = [
-        [
-            pair["name"],
-            pair["moving"]["part"],
-            pair["reference"]["part"],
-            float(counts[k]) if k < len(counts) else None,
-            *([pair.get("stiffness")] if gives else []),
-        ]
-        for k, pair in enumerate(document["pairs"])
-    ]
+    rows = []
+    for k, pair in enumerate(document["pairs"]):
+        points = float(counts[k]) if k < len(counts) else None
+        stiffness = [pair.get("stiffness")] if gives else []
+        rows.append([pair["name"], pair["moving"]["part"], pair["reference"]["part"], points, *stiffness])
     columns = ["contact pair", "moving part", "reference part", "contact points", *(["stiffness, N/mm"] if gives else [])]
     return Table("Contact pairs", columns, rows)
 

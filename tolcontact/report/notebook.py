@@ -7,8 +7,8 @@ import xarray as xr
 
 from tolcontact.compilation import Program
 from tolcontact.declaration import Assembly
-from tolcontact.report.html import nominal_and_faults, page_of, summary_table, view_page
-from tolcontact.report.summary_text import contact_lines
+from tolcontact.report.contact_text import contact_lines
+from tolcontact.report.html.page import nominal_and_faults, page_of, summary_table, view_page
 from tolcontact.statistics import Summary
 
 HEIGHT = 640  # pixels of a scene

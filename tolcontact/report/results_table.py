@@ -2,15 +2,14 @@
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.report.convention_text import unexplained_offsets
-from tolcontact.report.figures import grouped, limits_text, nominal_and_limits, number, percent
-from tolcontact.report.table import Table
+from tolcontact.report.contact_text import unexplained_offsets
+from tolcontact.report.table import Table, by_measure, grouped, limits_text, nominal_and_limits, number, percent
 from tolcontact.statistics.capability import CONSTANT, FAILS, KEPT, UNDECIDED, Verdict, verdict
 
 PPM_BELOW = 0.01  # if all shares are smaller, the table states them in ppm
@@ -24,19 +23,11 @@ COLUMNS = (
 SIDES = ("below", "above")
 
 
-class StateFigures(NamedTuple):
-    """The figures of a measurement in one state, as (estimate, lower, upper) of `STATISTICS`, and as texts."""
-
-    state: str
-    values: np.ndarray
-    cells: list[str]
-
-
 class ResultRow(NamedTuple):
     """The rows of the table for a measurement.
 
     verdict   "" without limits
-    states    with contact first
+    states    with contact first: the state in words, figures (estimate, lower, upper) of `STATISTICS`, and their texts, `cells`
     """
 
     name: str
@@ -48,7 +39,7 @@ class ResultRow(NamedTuple):
     lower: float
     upper: float
     limits: tuple[str, str, str]
-    states: list[StateFigures]
+    states: list[dict[str, Any]]
 
 
 def share_units(summary: xr.Dataset) -> str:
@@ -74,32 +65,33 @@ def share_heading(summary: xr.Dataset) -> str:
 
 def result_rows(summary: xr.Dataset) -> list[ResultRow]:
     """Return the rows of the table for each measurement."""
-    return [_row(summary.sel(measure=name), summary) for name in summary["measure"].values]
+    doubts, is_reserved, rows = doubts_of_all(summary), bool(reservation(summary)), []
+    for measure in by_measure(summary):
+        opinion, kept = verdict_of(measure, summary.attrs["realizations"]), _kept(measure)
+        is_open = opinion is None or opinion.word in (UNDECIDED, CONSTANT) or bool(kept) or is_reserved
+        labels = (terms.MEASURE_NOMINAL.name, *terms.MEASURE_LIMITS[:2])
+        nominal, lower, upper = (float(measure[label].values) for label in labels)
+        rows.append(
+            ResultRow(
+                full_name(measure),
+                str(measure["measure_units"].values),
+                str(measure["measure_quantity"].values),
+                f"{verdict_text(opinion)}{kept}{doubts}" if opinion else "",
+                None if is_open or opinion is None else opinion.word != FAILS,
+                nominal,
+                lower,
+                upper,
+                nominal_and_limits(nominal, lower, upper),
+                [_state_figures(measure.sel(state=state), share_units(summary)) for state in reversed(terms.STATES)],
+            )
+        )
+    return rows
 
 
-def _row(measure: xr.Dataset, summary: xr.Dataset) -> ResultRow:
-    opinion = verdict_of(measure, summary.attrs["realizations"])
-    nominal, lower, upper = (float(measure[name].values) for name in (terms.MEASURE_NOMINAL.name, *terms.MEASURE_LIMITS[:2]))
-    return ResultRow(
-        full_name(measure),
-        str(measure["measure_units"].values),
-        str(measure["measure_quantity"].values),
-        verdict_text(opinion) + (f"{_kept(measure)}{doubts_of_all(summary)}" if opinion else ""),
-        None
-        if opinion is None or opinion.word in (UNDECIDED, CONSTANT) or _kept(measure) or reservation(summary)
-        else opinion.word != FAILS,
-        nominal,
-        lower,
-        upper,
-        nominal_and_limits(nominal, lower, upper),
-        [_state_figures(measure.sel(state=state), share_units(summary)) for state in reversed(terms.STATES)],
-    )
-
-
-def _state_figures(of_state: xr.Dataset, units: str) -> StateFigures:
+def _state_figures(of_state: xr.Dataset, units: str) -> dict[str, Any]:
     values = of_state["statistic_value"].sel(statistic=list(STATISTICS)).transpose("statistic", "interval").values
-    below, above = (share_in(share, units) for share in values[3:])
-    return StateFigures(terms.WORD_OF_STATE[str(of_state["state"].values)], values, [*map(number, values[:3]), below, above])
+    cells = [*map(number, values[:3]), *(share_in(share, units) for share in values[3:])]
+    return {"state": terms.WORD_OF_STATE[str(of_state["state"].values)], "figures": values, "cells": cells}
 
 
 def verdict_of(measure: xr.Dataset, realizations: int) -> Verdict | None:
@@ -139,14 +131,11 @@ def doubts_of_all(summary: xr.Dataset) -> str:
 
 def _kept(measure: xr.Dataset) -> str:
     """Return which share of values contact keeps at a limit that is a stop; "" if none would be beyond it without contact."""
-    raw = measure["statistic_value"].sel(state=terms.STATES[terms.RAW])
-    sides = {side: raw.sel(statistic=statistic).values for side, statistic in zip(SIDES, terms.SHARES[:2], strict=True)}
-    stops = dict(zip(SIDES, terms.BOUNDS, strict=True))
-    kept = [
-        f"{percent(share)} {side}"
-        for side, share in sides.items()
-        if stops[side] in str(measure[terms.MEASURE_STOPS].values) and share[0] > 0
-    ]
+    raw, kept = measure["statistic_value"].sel(state=terms.STATES[terms.RAW]), []
+    for side, bound, statistic in zip(SIDES, terms.BOUNDS, terms.SHARES[:2], strict=True):
+        share = raw.sel(statistic=statistic).values
+        if bound in str(measure[terms.MEASURE_STOPS].values) and share[0] > 0:
+            kept.append(f"{percent(share)} {side}")
     return f", {KEPT}: without contact {' and '.join(kept)}" if kept else ""
 
 
@@ -162,23 +151,18 @@ def verdict_lines(summary: xr.Dataset, *, states_once: bool = False) -> Iterator
     What makes all verdicts doubtful follows each of them, or is stated once, in the last line.
     """
     doubts = doubts_of_all(summary)
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
+    for measure in by_measure(summary):
         if share := int(measure[terms.NOT_A_NUMBER].values) / summary.attrs["realizations"]:
-            yield f"{full_name(measure)}: not a number in {_rounded_share(share)} of the realizations, so it has no " + (
-                "verdict" if limits_text(measure) else "statistics"
-            )
+            # A share in percent with two digits, never rounded to 0 or to all.
+            rounded = f"{100 * share:.2g} %" if share < 0.995 else "100 %" if share == 1 else "more than 99 %"
+            lacking = "verdict" if limits_text(measure) else "statistics"
+            yield f"{full_name(measure)}: not a number in {rounded} of the realizations, so it has no {lacking}"
         if text := verdict_text(verdict_of(measure, summary.attrs["realizations"])):
             is_about_limits = not text.startswith((UNDECIDED, CONSTANT))
             remarks = f"{_kept(measure)}{'' if states_once else doubts}"
             yield f"{full_name(measure)}: {text}{' its limits' * is_about_limits}{remarks}"
     if states_once and doubts:
         yield f"all verdicts{doubts.replace('; ', ': ', 1) if doubts.startswith('; ') else doubts}"
-
-
-def _rounded_share(share: float) -> str:
-    """Return a share in percent with two digits, never rounded to 0 or to all."""
-    return f"{100 * share:.2g} %" if share < 0.995 else "100 %" if share == 1 else "more than 99 %"
 
 
 def has_no_verdict(summary: xr.Dataset) -> bool:
@@ -193,15 +177,13 @@ def overview_table(summary: xr.Dataset, *, is_long: bool = False) -> Table:
     In a long summary it only has figures with contact.
     """
     rows, units = [], share_units(summary)
-    words = dict(zip(terms.STATE_WORDS, terms.STATES, strict=True))
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
+    for measure in by_measure(summary):
         if not is_long:
             rows.append([full_name(measure), "", "", "", ""])
         values = measure["statistic_value"].sel(statistic=[terms.MEAN, terms.SIX_SIGMA, terms.PPK, terms.OUTSIDE])
-        for word in [terms.WITH_CONTACT] if is_long else words:
-            mean, spread, ppk, outside = values.sel(state=words[word]).values
+        for state in terms.STATES[-1:] if is_long else terms.STATES:
+            mean, spread, ppk, outside = values.sel(state=state).values
             figures = [number(mean), number(spread), number(ppk), share_in(outside, units).replace(" [", f" {units} [")]
-            rows.append([full_name(measure) if is_long else f"  {word}", *figures])
+            rows.append([full_name(measure) if is_long else f"  {terms.WORD_OF_STATE[state]}", *figures])
     heading = terms.WITH_CONTACT if is_long else ""
     return Table("", [heading, "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN], rows)

@@ -18,7 +18,7 @@ from tolcontact.replacing import replacing
 from tolcontact.report.contributor_shares import contributor_shares
 from tolcontact.report.model_tables import archived_settings, model_tables
 from tolcontact.report.results_table import STATISTICS, result_rows
-from tolcontact.report.table import Table
+from tolcontact.report.table import Table, by_measure
 from tolcontact.statistics.capability import VERDICT_RULE
 from tolcontact.texts import sheet_cell
 from tolcontact.vocabulary import units_of
@@ -87,19 +87,9 @@ def _document(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> 
 def _results(summary: xr.Dataset) -> Table:
     heads = [f"{name}{end}" for name in (*STATISTICS[:3], "share below limit", "share above limit") for end in INTERVAL]
     rows = [
-        [
-            row.name,
-            row.units,
-            row.quantity,
-            row.verdict,
-            row.nominal,
-            row.lower,
-            row.upper,
-            figures.state,
-            *figures.values.ravel(),
-        ]
+        [*row[:4], row.nominal, row.lower, row.upper, state["state"], *state["figures"].ravel()]
         for row in result_rows(summary)
-        for figures in row.states
+        for state in row.states
     ]
     labels = [terms.MEASUREMENT, "units", "quantity", "verdict", "nominal", "lower limit", "upper limit", "contact"]
     return Table("Results", [*labels, *heads], rows)
@@ -107,14 +97,13 @@ def _results(summary: xr.Dataset) -> Table:
 
 def _statistics(summary: xr.Dataset) -> Table:
     rows = []
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
-        units = str(measure["measure_units"].values)
+    for measure in by_measure(summary):
+        name, units = str(measure["measure"].values), str(measure["measure_units"].values)
         for state in terms.STATES:
             for statistic in summary["statistic"].values:
                 values = measure["statistic_value"].sel(state=state, statistic=statistic).values
                 if np.isfinite(values[0]):
-                    rows.append([str(name), terms.WORD_OF_STATE[state], str(statistic), units_of(statistic, units), *values])
+                    rows.append([name, terms.WORD_OF_STATE[state], str(statistic), units_of(statistic, units), *values])
     return Table("Statistics", [terms.MEASUREMENT, "contact", "statistic", "units", *terms.ESTIMATE], rows)
 
 
@@ -124,18 +113,17 @@ def _contributors(results: xr.DataTree, summary: xr.Dataset) -> Table:
         rows += [[str(name), group, *(100 * values)] for group, values in zip(shares.groups, shares.shares, strict=True)] or [
             [str(name), shares.note, None, None, None]
         ]
-    return Table(
-        terms.CONTRIBUTORS, [terms.MEASUREMENT, "contributor", *(f"share of variance{end}, %" for end in INTERVAL)], rows
-    )
+    heads = [f"share of variance{end}, %" for end in INTERVAL]
+    return Table(terms.CONTRIBUTORS, [terms.MEASUREMENT, "contributor", *heads], rows)
 
 
 def _contact(summary: xr.Dataset) -> Table:
-    heading = terms.reaction_words(summary["reaction"].attrs["units"]).heading.replace("\n", " ")
+    reaction = terms.reaction_words(summary["reaction"].attrs["units"]).heading
+    heads = [f"{heading}{end}".replace("\n", " ") for heading in (terms.IN_CONTACT, reaction) for end in INTERVAL]
     rows = []
     for pair in summary["pair"].values:
         of_pair = summary.sel(pair=pair)
         rows.append([str(pair), *of_pair["carried"].values, *of_pair["reaction"].sel(of_reaction=terms.MEAN).values])
-    heads = [f"{terms.IN_CONTACT.replace(chr(10), ' ')}{end}" for end in INTERVAL] + [f"{heading}{end}" for end in INTERVAL]
     return Table("Contact", ["contact pair", *heads], rows)
 
 

@@ -1,16 +1,17 @@
-"""Tables of a stack-up: worst case, RSS, inflated RSS and Monte Carlo range of each measurement."""
+"""Tables of stack-ups, of mechanisms, and of what a search changed: tolerances, or the position of a locator."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.report.figures import grouped, number
-from tolcontact.report.table import Table
+from tolcontact.report.table import AnalysisReport, Table, by_measure, grouped, number, percent, share
 from tolcontact.statistics.capability import MIN_TAIL
 
+AT_END = 1.001  # times the smallest factor of a tolerance: below this, it is as small as permitted
+MAX_POSITIONS = 12  # rows of a table; of more, some evenly spaced ones are shown
 WIDENING = 3.29 / 1.96  # from 95 % intervals to 99.9 % intervals, beyond which RSS misses the range
 NOTES = (
     "worst case, RSS: zones times sensitivities at the nominal assembly, about the centred value.",
@@ -21,10 +22,21 @@ NOTES = (
 )
 
 
-def stack_up_report(dataset: xr.Dataset, remarks: Sequence[str]) -> tuple[str, str, list[str], list[Table]]:
-    """Return name, number of realizations, notes and tables of a stack-up, with remarks on its realizations."""
+def lost_realizations(count: int) -> list[str]:
+    """Return a remark on realizations that were not resolved; none without any."""
+    return [f"{grouped(count)} realizations were not resolved; their last poses are included"] if count else []
+
+
+def unresolved(dataset: xr.Dataset) -> int:
+    """Return the number of realizations that were not resolved."""
+    return int(dataset["by_status"].values[list(terms.UNRESOLVED)].sum())
+
+
+def stack_up_report(dataset: xr.Dataset) -> AnalysisReport:
+    """Return worst case, RSS, inflated RSS and simulated range of each measurement."""
     count = f"{grouped(dataset.attrs['realizations'])} realizations"
-    return "Stack-up", count, [*NOTES, *remarks], [_table(dataset.sel(measure=name)) for name in dataset["measure"].values]
+    tables = [_table(measure) for measure in by_measure(dataset)]
+    return AnalysisReport("Stack-up", count, [*NOTES, *lost_realizations(unresolved(dataset))], tables)
 
 
 def _table(dataset: xr.Dataset) -> Table:
@@ -54,11 +66,11 @@ def _remarks(dataset: xr.Dataset, centred: float, rss: float) -> Iterator[str]:
         yield f"RSS has {int(dataset['forms'])} forms of faces with 3 sigma; worst case and MRSS have no figure for them."
     if lots := float(dataset.get("lots", 0.0)):  # archives of earlier versions have none
         yield f"Lots with their means on either side shift the mean by up to ±{lots:.4g}, if all are on the worse one."
-    states = dict(terms.WORD_OF_STATE)
-    if _is_without_contact(dataset):
-        states.pop(terms.STATES[0])
-    for state, word in states.items():
-        where = f", {word}" if len(states) > 1 else ""
+    is_without_contact = _is_without_contact(dataset)
+    for state, word in terms.WORD_OF_STATE.items():
+        if is_without_contact and state == terms.STATES[0]:
+            continue
+        where = "" if is_without_contact else f", {word}"
         if not np.isfinite(dataset["simulated"].sel(state=state)).all():
             yield f"RSS{where} is not judged: {MIN_TAIL} realizations bound the range, give --samples {MIN_TAIL} or more."
             continue
@@ -76,3 +88,124 @@ def _is_without_contact(dataset: xr.Dataset) -> bool:
     """Return whether contact changes nothing in the range of a measure."""
     raw, corrected = dataset["simulated"].values
     return np.array_equal(raw, corrected, equal_nan=True)
+
+
+def sweep_report(dataset: xr.Dataset) -> AnalysisReport:
+    """Return the envelope of a mechanism over all positions, and the means at each."""
+    notes = [
+        "The least and the largest value of each realization over all positions; 95 % intervals.",
+        "What lies between two positions is not seen.",
+        *lost_realizations(unresolved(dataset.sum("position"))),
+    ]
+    rows = [row for measure in by_measure(dataset) for row in _rows(measure)]
+    heading = ["", "mean", "6 sigma", "outer\npercentile", "mostly at"]
+    envelope = Table("", heading, rows, ["outer percentile: 0.135 % of the least values, 99.865 % of the largest"])
+    count = f"{grouped(dataset.attrs['realizations'])} realizations at {dataset.sizes['position']} positions"
+    return AnalysisReport("Mechanism", count, notes, [envelope, _means(dataset)])
+
+
+def _rows(measure: xr.Dataset) -> list[list[str]]:
+    """Return the rows of a measure: its share outside, and both ends of its envelope in both states."""
+    rows = [[f"{measure['measure'].values} ({measure['measure_units'].values})", "", "", "", ""]]
+    has_limits = not np.isnan(measure["outside"].values).any()
+    for word, state in zip(terms.STATE_WORDS, terms.STATES, strict=True):
+        in_state = measure.sel(state=state)
+        rows.append([f"  {word}", "", "", "", ""])
+        for end, extreme in terms.WORD_OF_END.items():
+            figures = [number(values) for values in in_state["envelope"].sel(end=end).values]
+            shares = in_state["extreme_share"].sel(end=end).values
+            place = f"{_position(measure, int(shares.argmax()))} ({100 * shares.max():.0f} %)"  # of most realizations
+            rows.append([f"    {extreme}", *figures, place])
+        if has_limits:
+            rows.append(["    beyond limits", percent(in_state["outside"].values), "", "", "at any position"])
+    return rows
+
+
+def _position(dataset: xr.Dataset, index: int) -> str:
+    names, values = dataset["parameter_name"].values, dataset["parameter"].values
+    moved = [k for k in range(len(names)) if np.ptp(values[k]) > 0] or [0]
+    return ", ".join(f"{names[k]} {values[k, index]:.4g}" for k in moved)
+
+
+def _means(dataset: xr.Dataset) -> Table:
+    count = dataset.sizes["position"]
+    chosen = np.unique(np.linspace(0, count - 1, min(count, MAX_POSITIONS)).round().astype(int))
+    means = dataset["mean"].sel(state=terms.STATES[terms.CORRECTED])
+    rows = [[_position(dataset, k), *(number(m.isel(position=k).values) for m in means)] for k in chosen]
+    return Table(f"Mean {terms.WITH_CONTACT} at each position", ["", *map(str, dataset["measure"].values)], rows)
+
+
+def allocation_report(dataset: xr.Dataset) -> AnalysisReport:
+    """Return what is required, the tolerances before and after, and what narrower ones would change."""
+    requirements = []
+    for name, values in zip(dataset["requirement"].values, dataset["kept"].values, strict=True):
+        requirements.append([str(name), *map(share if f": {terms.PPM}" in str(name) else number, values)])
+    ranges = []
+    for group in dataset["group"].values:
+        row = dataset.sel(group=group)
+        widths = [f"{width:.4g}" if math.isfinite(width) else "several" for width in row["range"].values]
+        factor = float(row["factor"])
+        if int(row["idle"]):
+            remark = "no influence"
+        elif factor <= dataset.attrs["floor"] * AT_END:
+            remark = "smallest allowed"
+        else:
+            remark = "largest allowed" if factor * AT_END >= dataset.attrs["ceiling"] else ""
+        ranges.append([str(group), *widths, f"{factor:.3g}", remark])
+    before, after = dataset["cost"].sum("group").values
+    tables = [
+        Table("", ["required", *terms.STAGES], requirements),
+        Table(f"Cost {before:.4g} before, {after:.4g} after", ["tolerance", *terms.STAGES, "factor", ""], ranges),
+        *(_effects(dataset["effect"].sel(measure=measure)) for measure in dataset["measure"].values),
+    ]
+    notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals."]
+    least, most = (f"{dataset.attrs[name]:g} times" for name in ("floor", "ceiling"))
+    notes.append(f"Tolerances may be {least} (smallest allowed) to {most} (largest allowed) those before.\n")
+    if choices := dataset.attrs.get("choices"):
+        notes.append(f"Choices: {choices}.\n")
+    if dataset["idle"].values.any():
+        count = dataset.attrs["idle_tried"]
+        notes.append(
+            f"No influence: with all of these tolerances together at {least} or {most} those before, none of {grouped(count)} "
+            f"resolved realizations changed. So at most {3 / count:.2g} of them do, with 95 % confidence.\n"
+        )
+    for (name, _, after), is_met in zip(requirements, dataset["met"].values, strict=True):
+        if not is_met:
+            notes.append(f'"{name}": no tolerances were found whose 95 % interval keeps it; the best: {after}.\n')
+    return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
+
+
+def _effects(effect: xr.DataArray) -> Table:
+    """Return the effects (of_effect, group, interval) on a measure, starting with the largest one."""
+    rows = []
+    for k in np.argsort(effect.values[0, :, 0], kind="stable"):
+        spread, outside = effect.values[:, k]
+        rows.append([str(effect["group"].values[k]), number(spread, sign=True), _ppm(outside, sign=True)])
+    title = f"{effect['measure'].values} [{effect['measure_units'].values}]: changes if zones were a tenth narrower than before"
+    return Table(title, ["", *terms.EFFECTS], rows)
+
+
+def relocation_report(dataset: xr.Dataset) -> AnalysisReport:
+    """Return both positions of a locator, and what they reach."""
+    statistic = dataset.attrs["least"]
+    is_share = statistic.endswith(terms.PPM)
+    text = share if is_share else number
+    rows = []
+    for stage, point, reached in zip(terms.STAGES, dataset["point"].values, dataset["reached"].values, strict=True):
+        rows.append([f"{stage}: ({', '.join(f'{c:.4g}' for c in point)})", text(reached)])
+    change = dataset["change"].values
+    rows.append(["after minus before", _ppm(change, sign=True)] if is_share else ["after / before", number(change)])
+    columns = [dataset.attrs["locator"], statistic if is_share else f"{statistic} [{dataset['measure_units'].values}]"]
+    samples, fresh = (grouped(dataset.attrs[word]) for word in ("samples", "fresh"))
+    notes = [
+        f"{samples} realizations for each trial position;",
+        f"{fresh} fresh ones for the figures below, with 95 % intervals.\n",
+    ]
+    before, after = dataset["point"].values
+    stays = ["No position between the corners is better: the locator stays where it is.\n"] * bool((before == after).all())
+    table = Table("", columns, rows, lost_realizations(int(dataset["unresolved"].max())))
+    return AnalysisReport("Position of a locator", f"{grouped(dataset.sizes['trial'])} trial positions", notes + stays, [table])
+
+
+def _ppm(values: np.ndarray, *, sign: bool = False) -> str:
+    return number(1e6 * np.asarray(values), sign=sign, max_decimals=0).replace(" [", " ppm [")

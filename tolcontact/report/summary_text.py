@@ -12,20 +12,18 @@ from rich.text import Text
 from scipy import special
 
 from tolcontact import vocabulary as terms
-from tolcontact.report.brief import EVERYTHING, MOST_DETAILED, MOST_LISTED, brief_measures
-from tolcontact.report.convention_text import convention_lines, offset_lines, offset_table
-from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
-from tolcontact.report.results_table import full_name, overview_table, verdict_lines
-from tolcontact.report.table import Table
-from tolcontact.statistics.capability import MIN_TAIL, MIN_TAILS
+from tolcontact.report.contact_text import CORRECTED, RAW, contact_lines, offset_table, pair_table
+from tolcontact.report.results_table import full_name, overview_table, verdict_lines, verdict_of
+from tolcontact.report.table import NO_INTERVAL, Table, by_measure, grouped, limits_text, number, percent, share
+from tolcontact.statistics.capability import CONSTANT, FAILS, MEETS, MIN_TAIL, MIN_TAILS, UNDECIDED
 from tolcontact.statistics.intervals import CONFIDENCE, MAX_KURTOSIS, MIN_SHAPE, MIN_VARIANCE
 from tolcontact.statistics.sample import MIN_APART
 
-RAW, CORRECTED = terms.STATES
+MOST_DETAILED, MOST_LISTED = 3, 6  # measurements with all their figures; measurements, parts or pairs in a table
+EVERYTHING = "the page has all, and so has tolcontact summary --all"
+URGENCY = {FAILS: 2.0, UNDECIDED: 1.0, "": 0.0, CONSTANT: -1.0, MEETS: -1.0}
 MOST_IN_LINE = 2  # parts or pairs, in a line of a long summary
-MOST_CLASHES = 2  # pairs of parts that lie in each other, in a long summary
 CHANGES_NOTE = "Changes are from the same draws.\n"
-DEEPEST = "largest penetration between surfaces"
 CHANGE_OF_STATISTIC = {"mean": terms.SHIFT, "6 sigma": terms.SPREAD_RATIO, "variance": terms.VARIANCE_RATIO}
 SHORT_LABELS = {"standard deviation": "std. dev.", terms.BELOW: "below the lower limit", terms.ABOVE: "above the upper limit",
                 terms.OUTSIDE: terms.OUT_OF_SPECIFICATION}  # fmt: skip
@@ -56,18 +54,18 @@ def _sections(summary: xr.Dataset, *, is_whole: bool) -> Iterator[Text | Table |
         yield Text(f"{grouped(count)} of {grouped(summary.attrs['samples'])} realizations are done; continue with --resume")
     is_long = not is_whole and max(summary.sizes["part"], summary.sizes["pair"]) > MOST_LISTED
     yield Text(f"{terms.ESTIMATES_NOTE}.\n{'' if is_long else CHANGES_NOTE}")
-    brief, remark = (summary, "") if is_whole else brief_measures(summary)
+    brief, remark = (summary, "") if is_whole else _brief_measures(summary)
     yield overview_table(brief, is_long=is_long)
     has_details = is_whole or (summary.sizes["measure"] <= MOST_DETAILED and not is_long)
     yield from map(Text, verdict_lines(brief, states_once=not has_details))
     if has_details:
-        yield from (measure_table(summary.sel(measure=name), summary.sizes["measure"]) for name in summary["measure"].values)
+        yield from (measure_table(measure, summary.sizes["measure"]) for measure in by_measure(summary))
     elif remark or not is_long:
         yield Text(remark or f"percentiles and capability of each: {EVERYTHING}")
     if not summary.sizes["part"]:
         return
-    magnitudes = int(summary["magnitude_realizations"])
     if not is_long:
+        magnitudes = int(summary["magnitude_realizations"])
         yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
         if magnitudes < count:
             yield Text(f"of at least the first {grouped(magnitudes)} realizations" if magnitudes else "not summed up")
@@ -79,10 +77,42 @@ def _sections(summary: xr.Dataset, *, is_whole: bool) -> Iterator[Text | Table |
     if is_long:
         yield from map(Text, _long_lines(summary))
         return
-    pairs, offsets = pair_table(summary) if summary.sizes["pair"] else None, offset_table(summary)
-    for table in filter(None, (pairs, offsets)):
-        yield Text()
-        yield table
+    for table in (pair_table(summary), offset_table(summary)):
+        if table is not None:
+            yield Text()
+            yield table
+
+
+def _brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """Return the summary of the measurements that fall short of their limits, and a remark about all others.
+
+    All measurements are kept if there are few. One that is not a number in some realizations falls short. If none does, the
+    first ones are kept.
+    """
+    count = summary.sizes[terms.MEASURE]
+    if count <= MOST_LISTED:
+        return summary, ""
+    measures = by_measure(summary)
+    opinions = [verdict_of(measure, summary.attrs["realizations"]) for measure in measures]
+    verdicts = [
+        FAILS if int(measure[terms.NOT_A_NUMBER].values) else "" if opinion is None else opinion.word
+        for measure, opinion in zip(measures, opinions, strict=True)
+    ]
+    shares = [float(m["statistic_value"].sel(state=CORRECTED, statistic=terms.OUTSIDE)[0]) for m in measures]
+    urgencies = [URGENCY[verdict] + float(np.nan_to_num(share)) / 2 for verdict, share in zip(verdicts, shares, strict=True)]
+    largest = np.argsort(-np.array(urgencies), kind="stable")[:MOST_LISTED]
+    failing = [index for index in sorted(largest.tolist()) if verdicts[index] in (FAILS, UNDECIDED)]
+    selection = failing or list(range(MOST_LISTED))
+    remainder = [verdict for index, verdict in enumerate(verdicts) if index not in selection]
+    phrases = {
+        "fall short, too": (FAILS,),
+        "undecided": (UNDECIDED,),
+        "without limits": ("",),
+        "meet their limits": (MEETS, CONSTANT),
+    }
+    counts = {phrase: sum(verdict in group for verdict in remainder) for phrase, group in phrases.items()}
+    remark = ", ".join(f"{number} more {phrase}" for phrase, number in counts.items() if number)
+    return summary.isel(measure=selection), f"{remark}; {EVERYTHING}"
 
 
 def _long_lines(summary: xr.Dataset) -> Iterator[str]:
@@ -105,20 +135,17 @@ def _long_lines(summary: xr.Dataset) -> Iterator[str]:
 
 def capability_text(summary: xr.Dataset) -> Group:
     """Return shares out of specification and capability of each measurement of a summary."""
-    return Group(
-        Text(f"{summary.attrs['title']}: {summary.attrs['realizations']} realizations", style="bold"), *_limits(summary)
-    )
-
-
-def _limits(summary: xr.Dataset) -> Iterator[Text | Table]:
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
-        title = f"{name} ({measure['measure_units'].values}): {limits_text(measure) or 'no limits'}"
-        if not limits_text(measure):
-            yield Text(f"\n{title}", style="bold")
-            continue
-        table = measure_table(measure.sel(statistic=[*terms.SHARES, *terms.CAPABILITY]), summary.sizes["measure"])
-        yield replace(table, title=title, columns=table.columns[:-1], rows=[row[:-1] for row in table.rows])
+    sections: list[Text | Table] = [
+        Text(f"{summary.attrs['title']}: {summary.attrs['realizations']} realizations", style="bold")
+    ]
+    for measure in by_measure(summary):
+        title = f"{measure['measure'].values} ({measure['measure_units'].values}): {limits_text(measure) or 'no limits'}"
+        if limits_text(measure):
+            table = measure_table(measure.sel(statistic=[*terms.SHARES, *terms.CAPABILITY]), summary.sizes["measure"])
+            sections.append(replace(table, title=title, columns=table.columns[:-1], rows=[row[:-1] for row in table.rows]))
+        else:
+            sections.append(Text(f"\n{title}", style="bold"))
+    return Group(*sections)
 
 
 def measure_table(measure: xr.Dataset, measures: int) -> Table:
@@ -180,7 +207,6 @@ def _measure_rows(measure: xr.Dataset, measures: int) -> list[list[str]]:
 
 
 def _field_table(summary: xr.Dataset) -> Table:
-    """Return the table of the displacement fields of the parts that move."""
     rows = []
     is_moving = (summary["field_extreme"].values != 0).any(axis=(1, 2, 3))
     for part in summary["part"].values[is_moving]:
@@ -189,160 +215,3 @@ def _field_table(summary: xr.Dataset) -> Table:
             extremes = [number(field.sel(extreme=extreme).values) for extreme in ("least", "largest")]
             rows.append([str(part), terms.WORD_OF_STATE[state], *extremes])
     return Table("", ["part", "", "smallest", "largest"], rows)
-
-
-def pair_table(summary: xr.Dataset) -> Table:
-    """Return the share of realizations with contact, and the reaction, of each pair."""
-    rows = []
-    for pair in summary["pair"].values:
-        mean, *_, high = summary["reaction"].sel(pair=pair).values
-        rows.append([str(pair), percent(summary["carried"].sel(pair=pair).values), number(mean), number(high)])
-    heading = terms.reaction_words(summary["reaction"].attrs["units"]).heading
-    return Table("", ["contact pair", terms.IN_CONTACT, heading, "95th\npercentile"], rows)
-
-
-def contact_lines(summary: xr.Dataset, count: int, *, is_long: bool = False) -> Iterator[str]:
-    """Yield lines about the contact of a run of `count` realizations; only what failed, if it is part of a long summary."""
-    if not is_long:
-        yield f"realizations touched by contact: {percent(summary['touched'].values)}"
-    by_status = _by_status(summary)
-    yield "status: " + ", ".join(f"{n} {meaning}" for meaning, n in by_status.items() if n)
-    conflicts = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
-    if conflicts and is_long:
-        yield f"not assemblable, so out of specification, and left out of other statistics: {', '.join(conflicts)}"
-    elif conflicts:
-        share = percent(summary["not_assemblable"].values)
-        yield f"not assemblable: {share}; these count as out of specification, and other statistics with contact leave them out"
-        yield f"pairs in conflict there: {', '.join(conflicts)}"
-    if unconverged := by_status["not_converged"]:
-        yield f"not converged: {unconverged} of {count}; the statistics include their last poses"
-    if doubtful := by_status["doubtful"]:
-        yield from _doubts(summary, int(doubtful), count)
-    yield from _clashes(summary, count, is_long=is_long)
-    raw, corrected = (settled(float(summary["penetration"].sel(state=state))) for state in (RAW, CORRECTED))
-    median, largest = summary["iterations"].values
-    steps = (
-        f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" and not is_long else ""
-    )
-    yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
-    if is_long:
-        yield from (line for line in (*_between(summary, count), *_advice(summary, corrected)) if not line.startswith(DEEPEST))
-        yield from offset_lines(summary)
-        if len(lines := [*convention_lines(summary)]) > 3:  # results depend on it
-            yield from lines
-        return
-    yield from convention_lines(summary)
-    yield from offset_lines(summary)
-    if shifted := summary.attrs["datum_shifts"]:
-        yield f"datum shift of {shifted}: not drawn; contact of the datum features determines it"
-    if elastic := summary.attrs["elastic_parts"]:
-        yield f"elastic parts: {elastic}; certificates hold at their contact points, bent"
-    if stored := summary.attrs["stored_coordinates"]:
-        yield stored
-    yield from summary.attrs["correlations"].splitlines()
-    yield f"largest penetration at contact points: {raw:.3g} mm without, {corrected:.3g} mm with contact"
-    yield from _between(summary, count)
-    yield from _advice(summary, corrected)
-
-
-def _doubts(summary: xr.Dataset, doubtful: int, count: int) -> Iterator[str]:
-    """Yield lines about answers that are not certified."""
-    in_bodies = min(int(summary["clash_count"].values[summary["clash_declared"].values == 1].sum()), doubtful)
-    number_far = f"{doubtful - in_bodies} of {count}"
-    if in_bodies < doubtful and summary["clash_share"].values[0] > 0:  # whose pairs are named instead of declared ones
-        yield (
-            f"doubtful: {number_far}: parts of a contact pair lie in each other beyond its faces, or too far from their poses "
-            "without contact; tolcontact check names these faces"
-        )
-    elif in_bodies < doubtful:
-        yield f"doubtful: {number_far} answers lie too far from the pose without contact to be certified"
-    if in_bodies:
-        parts = ", ".join(_clashes_of(summary, is_declared=True))
-        yield f"doubtful: in {in_bodies} of {count} answers bodies with declared contact still lie in each other: {parts}"
-        yield "advice: they probably meet beyond the chosen faces; tolcontact check names these, and writes the lines to add"
-
-
-def _clashes(summary: xr.Dataset, count: int, *, is_long: bool = False) -> Iterator[str]:
-    """Yield lines about bodies without contact that penetrate each other, and about the test of all bodies."""
-    watched, share = int(summary["watched"]), summary["clash_share"].values
-    if not watched:
-        is_linear = summary.attrs["resolution"] == "linearized"
-        reason = "by a linearized resolution" if is_linear else "in this archive"
-        yield f"bodies were not tested for interference {reason}: certificates hold for contact points"
-        return
-    if share[0] > 0:
-        clashes = _clashes_of(summary, is_declared=False)
-        if is_long:  # the verdicts state the share
-            rest = [f"{len(clashes) - MOST_CLASHES} more"] if len(clashes) > MOST_CLASHES else []
-            yield f"parts without declared contact lie in each other: {', '.join(clashes[:MOST_CLASHES] + rest)}"
-        else:
-            text = f"{percent(share)} of realizations; verdicts do not hold there"
-            yield f"parts without declared contact lie in each other: {text}"
-            yield f"these parts, where they lie deepest: {', '.join(clashes)}"
-        yield "advice: declare their contact, or that it is meant: assembly.may_overlap(...); tolcontact check writes the lines"
-    if is_long:
-        return
-    extent = f"all {grouped(watched)}" if watched == count else f"{grouped(watched)} of {grouped(count)}"
-    depth = summary.attrs["interference_depth"]
-    found = "see above" if share[0] > 0 else "none where certified"
-    yield f"interference of bodies from {depth:.2g} mm: {found} ({extent} tested)"
-    if summary.attrs["not_watched"]:
-        yield f"not tested for interference: {summary.attrs['not_watched']}"
-
-
-def _clashes_of(summary: xr.Dataset, *, is_declared: bool) -> list[str]:
-    """Return the pairs of parts that penetrate each other, with the number of realizations and the largest depth."""
-    columns = [summary[name].values for name in ("clash", "clash_count", "clash_largest_depth", "clash_declared")]
-    texts = []
-    for name, count, depth, declared in zip(*columns, strict=True):
-        if bool(declared) == is_declared:
-            texts.append(f"{name} ({grouped(int(count))}{f', up to {depth:.2g} mm' if math.isfinite(depth) else ''})")
-    return texts
-
-
-def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
-    """Yield lines about penetration between contact points, and about contact beyond the ends of faces."""
-    checked, depth, overhang = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
-    limit = terms.NOTICED_SHARE * summary.attrs["smallest_range"]
-    if math.isfinite(depth):
-        yield f"{DEEPEST}: {settled(depth):.3g} mm ({checked:.0f} of {count} checked)"
-        if depth > limit:
-            share = percent(summary["penetrating_share"].values)
-            least = f"{terms.NOTICED_SHARE:.0%} of the smallest tolerance"
-            yield f"penetration between surfaces above {least}: {share} of realizations"
-        if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
-            yield f"advice: {_way_out(summary)}"
-        if overhang > limit:
-            yield f"touching contact points lie up to {overhang:.3g} mm outside their reference face"
-    contacts, ended = (float(summary[name]) for name in ("contacts", "contacts_ended"))
-    if ended > 0:
-        yield f"contact beyond the end of a face: {ended:.0f} of {contacts:.0f} touching contact points, where checked"
-    for pair, depth in zip(summary["pair"].values, summary["false_contact"].values, strict=True):
-        if depth > limit:
-            share = percent(summary["false_contact_share"].values)
-            yield f'contact pair "{pair}": points lie up to {depth:.3g} mm inside where its surfaces are apart ({share})'
-            yield f"advice: its faces end within reach of contact; {_way_out(summary)}"
-
-
-def _way_out(summary: xr.Dataset) -> str:
-    """Return advice for surfaces that penetrate each other, or were resolved although they were apart."""
-    if summary.attrs["resolution"] == "linearized":
-        return "use --resolution exact"
-    if summary.attrs["search"] == "bounded":
-        return "use finer meshes, or where faces have form a smaller spacing"
-    return f'leave out search="{summary.attrs["search"]}"'
-
-
-def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
-    """Yield advice on penetration that remains after a linear step, or with the paper's set of active points."""
-    limit = terms.NOTICED_SHARE * summary.attrs["smallest_range"]
-    if penetration > limit and summary.attrs["active_set"] == "initial":
-        yield 'advice: points outside the initial set penetrate; use Method(active_set="closed")'
-    elif summary.attrs["resolution"] == "linearized" and penetration > limit:
-        yield f"advice: penetration exceeds {terms.NOTICED_SHARE:.0%} of the smallest tolerance; use --resolution exact"
-    elif summary.attrs["resolution"] == "linearized" and _by_status(summary)["not_converged"]:
-        yield "advice: some realizations did not converge; use --resolution exact"
-
-
-def _by_status(summary: xr.Dataset) -> dict[str, int]:
-    return {str(m): int(n) for m, n in zip(summary["status_meaning"].values, summary["by_status"].values, strict=True)}

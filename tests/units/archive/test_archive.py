@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tolcontact.archive import stored_rows
 from tolcontact.archive.variables import open_netcdf
+from tolcontact.archive.writer import choose
 
 
 def test_values_are_not_masked(archive):
@@ -13,4 +13,4 @@ def test_values_are_not_masked(archive):
 
 def test_rows_are_not_read_where_none_are_to_be_checked():
     no_file = None
-    assert [len(values) for values in stored_rows.choose(no_file, 0, seed=1)] == [0, 0]
+    assert [len(values) for values in choose(no_file, 0, seed=1)] == [0, 0]

@@ -39,7 +39,7 @@ def test_a_page_shows_form_and_the_gap_that_is_left(results, tmp_path, open_page
     form = next(SingleStates(results, np.array([row])).forms("block", *(
         results["field/block"][name].values for name in ("vertices", "faces")
     )))  # fmt: skip
-    assert opened.evaluate(depth) == pytest.approx(-1000 * (form.coefficients @ form.modes.T).max(), rel=1e-4)
+    assert opened.evaluate(depth) == pytest.approx(-1000 * (form["coefficients"] @ form["modes"].T).max(), rel=1e-4)
     opened.uncheck("#single")
     assert opened.evaluate(depth) == 0
     assert not opened.locator("#bar").is_visible()

@@ -13,6 +13,6 @@ def test_the_command_prints_seats_and_what_holds_them_and_keeps_them_for_the_pag
     assert done.returncode == 0, done.stderr
     with tc.open_archive(tmp_path / "run.nc") as results:
         (table,) = tables_of(results)
-    assert table["title"] == "Seating" and ["block.stop", "0.364", "-", "plane 100 %"] in table["rows"]
+    assert table.title == "Seating" and ["block.stop", "0.364", "-", "plane 100 %"] in table.rows
     rows = [line.split() for line in done.stdout.splitlines()]
     assert ["block.stop", "0.364", "-", "plane", "100", "%"] in rows

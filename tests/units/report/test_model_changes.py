@@ -1,6 +1,6 @@
 """Changes of a model by the documents in two archives."""
 
-from tolcontact.report.model_changes import model_changes
+from tolcontact.report.comparison_text import model_changes
 
 
 def test_changes_are_by_name_and_moved_lines_do_not_count():

@@ -1,8 +1,8 @@
-"""Form deviation in the scene of an archive: modes at the vertices of drawn faces, and remaining gaps at contact points."""
+"""Single realizations in the scene of an archive: form deviation, remaining gaps at contact points, and poses in stations."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy
@@ -10,28 +10,14 @@ import xarray as xr
 from scipy.spatial import Delaunay, QhullError
 
 from tolcontact import vocabulary as terms
+from tolcontact.discretization import Nominal
 from tolcontact.features.associated_features import COVARIANCES, displacement_terms
 
 MAX_GAPS = 1_000_000  # in a page: of all contact points in both states of the single realizations
 FLATNESS = 1e-6  # of the size of a face: tolerance for vertices and normals of a plane
 NEAR = 1.0  # correlation lengths: a vertex of the plane that is further from all stations belongs to another face
 HOLE = 3.0  # times the usual edge length between neighbouring contact points: a triangle with a longer edge is a hole
-
-
-@dataclass(frozen=True, eq=False)
-class ShownForm:
-    """The form deviation of a face at vertices of the drawn surface of its part.
-
-    vertices       (k,) their indices
-    normal         (3,) outward
-    modes          (k, mode) heights for unit coefficients
-    coefficients   (realization, mode) [mm]
-    """
-
-    vertices: np.ndarray
-    normal: np.ndarray
-    modes: np.ndarray
-    coefficients: np.ndarray
+Scene = dict[str, Any]
 
 
 class SingleStates:
@@ -60,19 +46,23 @@ class SingleStates:
     @property
     def are_known(self) -> bool:
         """Whether the archive keeps the poses and the deviations of realizations, and has contact points."""
-        is_kept = (
-            terms.DEVIATION.name in self._results["sample"].to_dataset() and terms.ROTATION.name in self._results.to_dataset()
-        )
+        is_kept = terms.DEVIATION.name in self._results["sample"] and terms.ROTATION.name in self._results
         return is_kept and terms.FACE_OF_MOVING.name in self._contact and terms.MOVING_POINT.name in self._contact
 
-    def forms(self, part: str, vertices: np.ndarray, faces: np.ndarray) -> Iterator[ShownForm]:
-        """Yield the forms of a part with vertices (vertex, 3) [mm] and triangles (face, 3)."""
+    def forms(self, part: str, vertices: np.ndarray, faces: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+        """Yield the forms of a part with vertices (vertex, 3) [mm] and triangles (face, 3), at vertices of its drawn surface.
+
+        vertices       (k,) their indices
+        normal         (3,) outward
+        modes          (k, mode) heights for unit coefficients
+        coefficients   (realization, mode) [mm]
+        """
         for face, covariance in enumerate(self._contact.get(terms.FORM_COVARIANCE.name, []) if self.are_known else []):
             is_plane = terms.SURFACE_KINDS[int(self._contact[terms.FORM_SURFACE["kind"].name][face])] == "plane"
             if covariance and is_plane and str(self._contact[terms.FEATURE_OF_FACE.name][face]).startswith(f"{part}."):
                 yield from self._shown(face, vertices, faces)
 
-    def _shown(self, face: int, vertices: np.ndarray, faces: np.ndarray) -> Iterator[ShownForm]:
+    def _shown(self, face: int, vertices: np.ndarray, faces: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         """Yield a form at the vertices in the plane of its stations, if triangles show it."""
         stations = self._contact[terms.FORM_STATION_PLACE.name][self._contact[terms.FACE_OF_FORM_STATION.name] == face]
         centre, size = stations.mean(axis=0), np.ptp(vertices, axis=0).max()
@@ -83,9 +73,12 @@ class SingleStates:
         corners = vertices[faces[is_shown[faces].all(axis=1)]]
         if len(corners):
             outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
-            numbers, columns = np.flatnonzero(is_shown), self._columns(face)
-            modes = self._modes(face, vertices[numbers])
-            yield ShownForm(numbers, outward / np.linalg.norm(outward), modes, self._deviations[:, columns])
+            yield {
+                "vertices": np.flatnonzero(is_shown),
+                "normal": outward / np.linalg.norm(outward),
+                "modes": self._modes(face, vertices[is_shown]),
+                "coefficients": self._deviations[:, self._columns(face)],
+            }
 
     def _columns(self, face: int) -> np.ndarray:
         """Return the contributors (mode,) that are the coefficients of a form."""
@@ -94,16 +87,14 @@ class SingleStates:
 
     def _modes(self, face: int, places: np.ndarray) -> np.ndarray:
         """Return the form heights (point, mode) of a plane at points (point, 3) [mm], for unit coefficients."""
-        is_own, removed = self._contact[terms.FACE_OF_FORM_STATION.name] == face, self._contact[terms.FORM_REMOVED.name][face]
-        stations, weights = (
-            self._contact[terms.FORM_STATION_PLACE.name][is_own],
-            self._contact[terms.FORM_STATION_WEIGHT.name][is_own],
-        )
-        distance = scipy.spatial.distance.cdist(places, stations) / self._contact[terms.FORM_LENGTH.name][face]
-        covariance = COVARIANCES[str(self._contact[terms.FORM_COVARIANCE.name][face])](distance)
-        normals = np.broadcast_to(self._contact[terms.FORM_SURFACE["axis"].name][face], places.shape)
+        contact = self._contact
+        is_of_face, removed = contact[terms.FACE_OF_FORM_STATION.name] == face, contact[terms.FORM_REMOVED.name][face]
+        stations, weights = (contact[v.name][is_of_face] for v in (terms.FORM_STATION_PLACE, terms.FORM_STATION_WEIGHT))
+        distance = scipy.spatial.distance.cdist(places, stations) / contact[terms.FORM_LENGTH.name][face]
+        covariance = COVARIANCES[str(contact[terms.FORM_COVARIANCE.name][face])](distance)
+        normals = np.broadcast_to(contact[terms.FORM_SURFACE["axis"].name][face], places.shape)
         heights = covariance @ weights - displacement_terms(normals, places) @ removed.T
-        return np.asarray(heights[:, self._contact[terms.FORM_CONTRIBUTOR.name][face] >= 0])
+        return np.asarray(heights[:, contact[terms.FORM_CONTRIBUTOR.name][face] >= 0])
 
     def gaps(self, pair: int) -> np.ndarray | None:
         """Return the gaps (realization, state, point) [mm] at the contact points of a pair of planes; None for other pairs.
@@ -168,3 +159,78 @@ class SingleStates:
         if terms.FORM_COVARIANCE.name in self._contact and self._contact[terms.FORM_COVARIANCE.name][face]:
             heights += self._deviations[:, self._columns(face)] @ self._modes(face, places).T
         return heights
+
+
+def stations_of(results: xr.DataTree) -> list[Scene]:
+    """Return the scene of each station of an archive; none without stations."""
+    if terms.STATIONS_GROUP not in results.children:
+        return []
+    rows, groups = results.to_dataset(), results[terms.STATIONS_GROUP].children.values()
+    names = [str(group.attrs["station"]) for group in groups]
+    order = {str(part): number for number, part in enumerate(rows[terms.PART].values)}
+    locators = [str(name) for name in results["sample"].to_dataset()[terms.LOCATOR].values]  # station.body.locator
+    owners = [max((name for name in names if locator.startswith(f"{name}.")), key=len, default="") for locator in locators]
+    return [
+        {
+            "name": name,
+            "parts": [order[str(part)] for part in group.to_dataset()[terms.STATION_PART].values],
+            "locators": [locator for locator, station in zip(locators, owners, strict=True) if station == name],
+            "contacts": _labels(rows, terms.PAIR, terms.PAIR_STATION, name),
+            "measures": _labels(rows, terms.MEASURE, terms.MEASURE_STATION, name),
+        }
+        for name, group in zip(names, groups, strict=True)
+    ]
+
+
+def stations_of_nominal(nominal: Nominal | None) -> list[Scene]:
+    """Return the scene of each station of a model before a run; none for a model with faults, or without stations."""
+    if nominal is None:
+        return []
+    return [
+        {
+            "name": scene.station,
+            "parts": [nominal.assembly.parts.index(part) for part in scene.assembly.parts],
+            "locators": [label for part in nominal.parts if part.station == scene.station for label in part.locators.labels],
+            "contacts": [pair.name for pair in nominal.pairs if nominal.parts[pair.moving].station == scene.station],
+            "measures": [measure.name for measure in scene.measures],
+        }
+        for scene in nominal.scenes
+    ]
+
+
+def station_poses(results: xr.DataTree, station: str, states: SingleStates) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return R (row, state, part, 3, 3) and t (row, state, part, 3) [mm] of all parts in a station; None if not archived.
+
+    Parts that the station does not hold are in their nominal pose.
+    """
+    group = results[terms.station_group(station)].to_dataset()
+    if terms.STATION_ROTATION.name not in group:
+        return None
+    t_held, R_held = (states.read(group, variable) for variable in terms.STATION_POSES)
+    return _of_all_parts(results, station, R_held, t_held)
+
+
+def worst_poses(results: xr.DataTree, station: str, worst: xr.Dataset | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return R (case, state, part, 3, 3) and t (case, state, part, 3) [mm] of worst cases in a station; none without them."""
+    if worst is None:
+        none = np.zeros((0, len(terms.STATES), results.sizes[terms.PART], 3, 3))
+        return none, none[..., 0]
+    groups = results[terms.STATIONS_GROUP].children.values()
+    owners = np.repeat([group.attrs["station"] for group in groups], [group.sizes[terms.STATION_PART] for group in groups])
+    t_held, R_held = (worst[variable.name].values[:, :, owners == station] for variable in terms.STATION_POSES)
+    return _of_all_parts(results, station, R_held, t_held)
+
+
+def _of_all_parts(results: xr.DataTree, station: str, R_held: np.ndarray, t_held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return R and t of all parts, nominal for parts that the station does not hold."""
+    parts = results.to_dataset()[terms.PART].values
+    held_parts = results[terms.station_group(station)].to_dataset()[terms.STATION_PART].values
+    positions = [parts.tolist().index(part) for part in held_parts]
+    R = np.tile(np.eye(3), (len(R_held), len(terms.STATES), len(parts), 1, 1))
+    t = np.zeros((len(R_held), len(terms.STATES), len(parts), 3))
+    R[:, :, positions], t[:, :, positions] = R_held, t_held
+    return R, t
+
+
+def _labels(rows: xr.Dataset, dim: str, of_station: terms.ArchiveVariable, station: str) -> list[str]:
+    return [str(name) for name in rows[dim].values[rows[of_station.name].values == station]]

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,37 +21,28 @@ from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.realizations import archived_analysis, declaration_of, finished
 from tolcontact.replacing import replacing
 from tolcontact.report.analysis_tables import analysis_report
-from tolcontact.report.comparison_text import change_table, contributor_table, runs_lines, value_table
+from tolcontact.report.comparison_text import change_table, contributor_table, model_changes, runs_lines, value_table
+from tolcontact.report.contact_text import contact_lines, offset_table, pair_table
 from tolcontact.report.contributor_shares import ContributorShares, contributor_shares, shares_or_first_order
-from tolcontact.report.convention_text import offset_table
 from tolcontact.report.elastic_tables import RigidMeasured, elastic_tables
-from tolcontact.report.figures import grouped, limits_text
-from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
-from tolcontact.report.html.loop import loops_of
+from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, loops_of, relations_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
-from tolcontact.report.model_changes import model_changes
 from tolcontact.report.model_tables import archived_settings, chains_of, dimensions_of, model_tables
 from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
-from tolcontact.report.summary_text import contact_lines, measure_table, pair_table
+from tolcontact.report.summary_text import measure_table
+from tolcontact.report.table import Table, by_measure, grouped, limits_text
 from tolcontact.statistics.capability import VERDICT_RULE
 
 HERE = Path(__file__).parent
 GENERATOR = '<meta name="generator" content="tolcontact">'
 SCRIPTS = {
     "report": (
-        "vendor/three.min.js",
-        "vendor/plotly-basic.min.js",
-        "data.js",
-        "labels.js",
-        "viewer.js",
-        "reactions.js",
-        "stations.js",
-        "charts.js",
-        "report.js",
+        "vendor/three.min.js", "vendor/plotly-basic.min.js", "data.js", "labels.js", "viewer.js", "reactions.js", "stations.js",
+        "charts.js", "report.js",
     ),
     "view": ("vendor/three.min.js", "data.js", "labels.js", "viewer.js", "stations.js", "features.js", "view.js"),
     "compare": ("vendor/plotly-basic.min.js", "data.js", "charts.js", "compare.js"),
-}
+}  # fmt: skip
 TITLE_ENTRIES = {"part_number": "part number", "revision": "revision", "author": "author", "date": "date"}
 MAX_ROWS = 15  # of the table of an analysis, above a fold
 WORDS = {
@@ -111,7 +103,7 @@ def page_of(
         "loops": loops_of(chains_of(document), dimensions_of(document)),
         "has_parts": summary.sizes["part"] > 0,
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
-        "pairs": pair_table(summary) if summary.sizes["pair"] else None,
+        "pairs": pair_table(summary),
         "offsets": offset_table(summary),
         "elastic": list(elastic_tables(results, rigid)),
         "reactions": terms.reaction_words(summary["reaction"].attrs["units"]).explanation,
@@ -138,6 +130,9 @@ def view_page(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]
     """Return the view of a model before a run; `nominal` is None for a model with faults other than omissions."""
     omissions = [fault for fault in assembly.omissions() if fault in faults]
     remaining_faults = [fault for fault in faults if fault not in omissions]
+    scene, file = view_of(assembly, nominal, remaining_faults), ""
+    if assembly.parts and not nominal and not faults:  # nothing else is declared yet
+        file = Path(str(getattr(assembly.parts[0].geometry, "source", ""))).name
     values = {
         "title": assembly.name,
         "faults": remaining_faults,
@@ -146,8 +141,8 @@ def view_page(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]
         "has_parts": bool(assembly.parts),
         "has_features": any(part.toleranced for part in assembly.parts),
         "pairs": gap_rows(nominal),
-        "file": _file(assembly, nominal, faults),
-        "stations": (scene := view_of(assembly, nominal, remaining_faults))["stations"],
+        "file": file,
+        "stations": scene["stations"],
     }
     return _page("view", values, {"scene": scene, "charts": []})
 
@@ -160,21 +155,17 @@ def nominal_and_faults(assembly: Assembly) -> tuple[Nominal | None, tuple[str, .
         return None, tuple(dict.fromkeys([*assembly.omissions(), *error.faults]))
 
 
-def _file(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:
-    """Return the file name of the parts, if nothing else is declared yet."""
-    return "" if nominal or faults or not assembly.parts else Path(str(getattr(assembly.parts[0].geometry, "source", ""))).name
-
-
 def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> str:
     """Return the comparison of runs as a page."""
     measures, (reference, *others) = [], runs
     documents = {name: declaration_of(results) for name, results in runs.items()}
-    shares = {name: _shares_by_measure(results) for name, results in runs.items()}
-    for name in comparison["measure"].values:
-        measure = comparison.sel(measure=name)
-        contributors = contributor_table({run: of_run[str(name)] for run, of_run in shares.items()})
+    positions = {name: results.to_dataset()[terms.MEASURE].values.tolist() for name, results in runs.items()}
+    shares = {name: contributor_shares(results, finished(results)) for name, results in runs.items()}
+    for measure in by_measure(comparison):
+        name = str(measure["measure"].values)
+        contributors = contributor_table({run: shares[run][names.index(name)] for run, names in positions.items()})
         tables = [value_table(measure), change_table(measure), *([contributors] if contributors.rows else [])]
-        measures.append({"name": str(name), "units": str(measure["measure_units"].values), "tables": tables})
+        measures.append({"name": name, "units": str(measure["measure_units"].values), "tables": tables})
     values = {
         "title": comparison.attrs["title"],
         "reference": comparison.attrs["reference_run"],
@@ -194,18 +185,12 @@ def _block(results: xr.DataTree, titles: TitleBlock) -> dict[str, str]:
     return {word: entry for word, entry in entries.items() if entry}
 
 
-def _shares_by_measure(results: xr.DataTree) -> dict[str, ContributorShares]:
-    names = map(str, results.to_dataset()[terms.MEASURE].values)
-    return dict(zip(names, contributor_shares(results, finished(results)), strict=True))
-
-
 def summary_table(summary: xr.Dataset) -> str:
     """Return the overview of a summary as a table outside of a page."""
     return _template("overview").render(results=_results(summary))
 
 
 def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
-    """Return a page of a kind, which selects its template and scripts."""
     scripts = [_as_is(file) for file in SCRIPTS[kind]]
     data |= {"states": terms.STATE_WORDS}
     hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts]
@@ -244,45 +229,34 @@ def _results(summary: xr.Dataset) -> dict[str, Any]:
 def _details(summary: xr.Dataset, shares: Sequence[ContributorShares]) -> list[dict[str, Any]]:
     """Return the details of each measurement: limits, contributors, and all estimates as rows of texts."""
     details = []
-    for name, contributors in zip(summary["measure"].values, shares, strict=True):
-        measure = summary.sel(measure=name)
+    for measure, contributors in zip(by_measure(summary), shares, strict=True):
+        name, units = (str(measure[label].values) for label in ("measure", "measure_units"))
         table = measure_table(measure, summary.sizes["measure"])
-        details.append(
-            {
-                "name": str(name),
-                "units": str(measure["measure_units"].values),
-                "limits": limits_text(measure),
-                "rows": table.rows,
-                "note": "; ".join(table.remarks),
-                "contributors": contributors,
-            }
-        )
+        figures = {"limits": limits_text(measure), "rows": table.rows, "note": "; ".join(table.remarks)}
+        details.append({"name": name, "units": units, "contributors": contributors, **figures})
     return details
 
 
 def _missing(scene: dict[str, Any]) -> list[str]:
     """Return sentences about data that the archive does not have, or that the page simplifies."""
-    remarks = []
-    if not any("mean" in part for part in scene["parts"]):
-        remarks.append("The archive has no displacement fields.")
-    if "motions" not in scene["realizations"]:
-        remarks.append("The archive has no poses: single realizations have figures only.")
-    coarse = [
-        f"{part['name']} {grouped(part['faces']['shape'][0])} of {grouped(part['triangles'])}"
-        for part in scene["parts"]
-        if part["faces"]["shape"][0] < part["triangles"]
-    ]
-    return [*remarks, f"Parts are drawn with fewer triangles than they have: {', '.join(coarse)}."] if coarse else remarks
+    counts = {part["name"]: (part["faces"]["shape"][0], part["triangles"]) for part in scene["parts"]}
+    coarse = [f"{name} {grouped(drawn)} of {grouped(count)}" for name, (drawn, count) in counts.items() if drawn < count]
+    remarks = {
+        "The archive has no displacement fields.": not any("mean" in part for part in scene["parts"]),
+        "The archive has no poses: single realizations have figures only.": "motions" not in scene["realizations"],
+        f"Parts are drawn with fewer triangles than they have: {', '.join(coarse)}.": bool(coarse),
+    }
+    return [remark for remark, is_true in remarks.items() if is_true]
 
 
 def contributions_of(results: xr.DataTree) -> list[dict[str, Any]]:
     """Return total and first-order shares of each measure's groups, in both states, the largest total share first."""
     dataset = archived_analysis(results, terms.CONTRIBUTIONS)
-    return [] if dataset is None else [_shares(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
+    return [] if dataset is None else list(map(_shares, by_measure(dataset)))
 
 
-def tables_of(results: xr.DataTree) -> Iterator[dict[str, Any]]:
-    """Yield the tables of all other analyses, with titles, columns, rows, and remarks below."""
+def tables_of(results: xr.DataTree) -> Iterator[Table]:
+    """Yield the tables of all other analyses, with titles, and notes as remarks below the first one."""
     for record in terms.ANALYSES.values():
         dataset = archived_analysis(results, record)
         if dataset is None:
@@ -292,21 +266,20 @@ def tables_of(results: xr.DataTree) -> Iterator[dict[str, Any]]:
         for table in report.tables:
             if not table.is_detail:
                 title = f"{report.name}: {table.title}" if table.title else report.name
-                yield {"title": title, "columns": table.columns, "rows": table.rows, "remarks": [*table.remarks, *notes]}
+                yield replace(table, title=title, remarks=[*table.remarks, *notes])
                 notes = []
 
 
 def _shares(dataset: xr.Dataset) -> dict[str, Any]:
     total = dataset["total"].sel(interval="estimate")
     order = np.argsort(-np.nan_to_num(total.max("state").values), kind="stable")[:MAX_BARS]
-    states = [
-        {word: [_percents(dataset[word].values[state, k]) for k in order] for word in ("first", "total")}
-        for state in range(len(terms.STATES))
-    ]
     return {
         "measure": str(dataset["measure"].values),
-        "groups": [str(dataset["group"].values[k]) for k in order],
-        "states": states,
+        "groups": [str(group) for group in dataset["group"].values[order]],
+        "states": [
+            {word: [_percents(shares) for shares in dataset[word].values[state, order]] for word in ("first", "total")}
+            for state in range(len(terms.STATES))
+        ],
         "linear": _percents(dataset["linear"].values[order]),
     }
 

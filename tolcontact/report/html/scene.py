@@ -1,8 +1,7 @@
 """The 3D scenes of pages: of an archive with fields and single realizations, and of a declared assembly with features."""
 
 import base64
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import fast_simplification
@@ -12,10 +11,8 @@ import xarray as xr
 from scipy.spatial import cKDTree
 
 from tolcontact import vocabulary as terms
-from tolcontact.declaration import Assembly, Face, Feature, Part, Pattern
-from tolcontact.declaration.feature_tolerance import GeometricTolerance
+from tolcontact.declaration import Assembly, Feature, Part, Pattern
 from tolcontact.declaration.selection import Inside
-from tolcontact.declaration.size import Size
 from tolcontact.discretization import Nominal
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry import PartPreview, preview
@@ -23,8 +20,8 @@ from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.realizations import archived_analysis, finished
 from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
 from tolcontact.report.elastic_tables import reactions_of
-from tolcontact.report.html.form_scene import MAX_GAPS, SingleStates
-from tolcontact.report.html.station_scenes import station_poses, stations_of, stations_of_nominal, worst_poses
+from tolcontact.report.html import form_scene
+from tolcontact.report.html.form_scene import MAX_GAPS, Scene, SingleStates
 from tolcontact.statistics import touching
 
 Packed = dict[str, Any]
@@ -33,40 +30,30 @@ MIN_TRIANGLES = 500  # of a body
 MAX_EXCESS = 1.2  # ratio of triangles to the target number, above which the fast method has failed
 EXTREMES = 5  # of each measure, on either side
 MAX_REALIZATIONS = 300
-Entry = dict[str, Any]
 
 
 def single_realizations(results: xr.DataTree) -> dict[int, str]:
     """Return realizations in the order of the page, with the reason to show each; extremes refer to corrected measures."""
     done = finished(results)
-    rows = results.to_dataset().isel({terms.REALIZATION: slice(done)})
+    measured = results.to_dataset()[terms.MEASURED.name].isel({terms.REALIZATION: slice(done), terms.STATE: terms.CORRECTED})
     reasons: dict[int, str] = {}
-    for number, measure in enumerate(rows[terms.MEASURE].values):
-        for extreme, extreme_rows in zip(("smallest", "largest"), _extremes(rows, number), strict=True):
-            for row in extreme_rows:
-                reasons.setdefault(int(row), f"{extreme} {measure}")
-    for row in np.random.default_rng(0).permutation(done)[: MAX_REALIZATIONS + len(reasons)]:
+    for measure, values in zip(measured[terms.MEASURE].values, measured.values.T, strict=True):
+        order = np.argsort(values, kind="stable")
+        order = order[np.isfinite(values[order])]
+        for extreme, rows in (("smallest", order), ("largest", order[::-1])):
+            for row in rows[:EXTREMES].tolist():
+                reasons.setdefault(row, f"{extreme} {measure}")
+    for row in np.random.default_rng(0).permutation(done)[: MAX_REALIZATIONS + len(reasons)].tolist():
         if len(reasons) >= MAX_REALIZATIONS:
             break
-        reasons.setdefault(int(row), "at random")
+        reasons.setdefault(row, "at random")
     return dict(list(reasons.items())[:MAX_REALIZATIONS])
-
-
-def _extremes(rows: xr.Dataset, measure: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows with the smallest and with the largest corrected values, the most extreme first."""
-    values = rows[terms.MEASURED.name].isel({terms.STATE: terms.CORRECTED, terms.MEASURE: measure}).values
-    order = np.argsort(values, kind="stable")
-    order = order[np.isfinite(values[order])]
-    return order[:EXTREMES], order[::-1][:EXTREMES]
 
 
 def packed(values: Any, kind: str = "f4") -> Packed:
     """Return an array packed as single-precision floats, "f4", or as integers, "i4"."""
     array = np.ascontiguousarray(values, dtype=f"<{kind}")
     return {"shape": list(array.shape), "kind": kind, "data": base64.b64encode(array.tobytes()).decode()}
-
-
-Scene = dict[str, Any]
 
 
 def scene_of(results: xr.DataTree, summary: xr.Dataset) -> Scene:
@@ -80,8 +67,7 @@ def scene_of(results: xr.DataTree, summary: xr.Dataset) -> Scene:
         "stations": _stations(results, states),
         "reactions": _reactions(results),
     }
-    _add_contact(scene["contacts"], results, summary)
-    _add_gaps(scene["contacts"], states, len(singles))
+    _add_contact(scene["contacts"], results, summary, states, len(singles))
     return {**scene, "reactionUnits": summary["reaction"].attrs["units"]}
 
 
@@ -89,30 +75,25 @@ def _reactions(results: xr.DataTree) -> list[Scene]:
     """Return the arrows of reactions of elastic parts: place, direction, mean, and 2.5th and 97.5th percentiles [N]."""
     arrows = []
     for reaction in reactions_of(results):
-        if len(reaction.values):
-            low, high = np.percentile(reaction.values, (2.5, 97.5)).tolist()
-            arrows.append(
-                {"pair": reaction.pair, "at": reaction.at.tolist(), "along": reaction.along.tolist(),
-                 "mean": float(reaction.values.mean()), "low": low, "high": high}
-            )  # fmt: skip
+        if len(x := reaction.values):
+            low, high = np.percentile(x, (2.5, 97.5)).tolist()
+            place = {"pair": reaction.pair, "at": reaction.at.tolist(), "along": reaction.along.tolist()}
+            arrows.append({**place, "mean": float(x.mean()), "low": low, "high": high})
     return arrows
 
 
-def _add_contact(pairs: list[Scene], results: xr.DataTree, summary: xr.Dataset) -> None:
-    """Add the probability of contact of each contact point, and the mean reaction of each pair."""
-    contact = touching(results) if pairs else None
-    for pair in pairs:
+def _add_contact(pairs: list[Scene], results: xr.DataTree, summary: xr.Dataset, states: SingleStates, count: int) -> None:
+    """Add the probability of contact of each contact point, the mean reaction of each pair, and gaps between planes.
+
+    Gaps are in `count` single realizations, with triangles between the contact points.
+    """
+    contact, points = touching(results) if pairs else None, sum(pair["points"]["shape"][0] for pair in pairs)
+    for number, pair in enumerate(pairs):
         if contact is not None and contact.attrs["realizations"]:
             is_of_pair = contact["pair"].values == pair["name"]
             pair["touching"] = packed(contact["touching"].sel(interval="estimate").values[is_of_pair])
         mean = float(summary["reaction"].sel(pair=pair["name"], of_reaction="mean", interval="estimate"))
         pair["reaction"] = mean if np.isfinite(mean) else None
-
-
-def _add_gaps(pairs: list[Scene], states: SingleStates, count: int) -> None:
-    """Add triangles between the contact points of each pair of planes, and their gaps in single realizations."""
-    points = sum(pair["points"]["shape"][0] for pair in pairs)
-    for number, pair in enumerate(pairs):
         pair["triangles"] = packed(states.triangles(number), "i4")
         gaps = states.gaps(number) if count * len(terms.STATES) * points <= MAX_GAPS else None
         pair["gapsLeft"] = None if gaps is None else packed(gaps)
@@ -121,35 +102,31 @@ def _add_gaps(pairs: list[Scene], states: SingleStates, count: int) -> None:
 def packed_marks(marks: Marks) -> Scene:
     """Return annotations by kind as the data of a page."""
     return {
-        field.name: [
-            {key: packed(value) if isinstance(value, np.ndarray) else value for key, value in mark.items()}
-            for mark in getattr(marks, field.name)
+        kind: [
+            {key: packed(value) if isinstance(value, np.ndarray) else value for key, value in mark.items()} for mark in entries
         ]
-        for field in fields(marks)
+        for kind, entries in vars(marks).items()
     }
 
 
 def _parts(results: xr.DataTree, states: SingleStates) -> list[Scene]:
-    names = [str(name) for name in results.to_dataset()[terms.PART].values]
-    fields = [results["field"].children[terms.group_of(name)].to_dataset() for name in names]
-    counts = triangle_budgets([field.sizes[terms.FACE] for field in fields])
-    return [_part(name, field, count, states) for name, field, count in zip(names, fields, counts, strict=True)]
-
-
-def _part(name: str, field: xr.Dataset, count: int, states: SingleStates) -> Scene:
-    triangles = field[terms.FIELD_FACES.name].values
-    vertices, faces, nearest = coarser(field[terms.FIELD_VERTICES.name].values, triangles, count)
-    entries: Scene = {"name": name, "vertices": packed(vertices), "faces": packed(faces, "i4"), "triangles": len(triangles)}
-    entries["forms"] = [
-        {"vertices": packed(form.vertices, "i4"), "normal": form.normal.tolist(), "modes": packed(form.modes),
-         "coefficients": packed(form.coefficients)}
-        for form in states.forms(name, vertices, faces)
-    ]  # fmt: skip
-    for key, variable in (("mean", terms.FIELD_MEAN), ("sixSigma", terms.FIELD_SIX_SIGMA)):
-        values = field[variable.name].values[:, nearest]
-        if np.isfinite(values[..., :3]).all():
-            entries[key] = packed(values)
-    return entries
+    fields = {name: results[terms.field_of(name)].to_dataset() for name in map(str, results.to_dataset()[terms.PART].values)}
+    counts, parts = triangle_budgets([field.sizes[terms.FACE] for field in fields.values()]), []
+    for (name, field), count in zip(fields.items(), counts, strict=True):
+        triangles = field[terms.FIELD_FACES.name].values
+        vertices, faces, nearest = coarser(field[terms.FIELD_VERTICES.name].values, triangles, count)
+        part: Scene = {"name": name, "vertices": packed(vertices), "faces": packed(faces, "i4"), "triangles": len(triangles)}
+        part["forms"] = [
+            {"vertices": packed(form["vertices"], "i4"), "normal": form["normal"].tolist(), "modes": packed(form["modes"]),
+             "coefficients": packed(form["coefficients"])}
+            for form in states.forms(name, vertices, faces)
+        ]  # fmt: skip
+        for key, variable in (("mean", terms.FIELD_MEAN), ("sixSigma", terms.FIELD_SIX_SIGMA)):
+            values = field[variable.name].values[:, nearest]
+            if np.isfinite(values[..., :3]).all():
+                part[key] = packed(values)
+        parts.append(part)
+    return parts
 
 
 def _realizations(results: xr.DataTree, singles: dict[int, str], states: SingleStates) -> Scene:
@@ -177,10 +154,10 @@ def _realizations(results: xr.DataTree, singles: dict[int, str], states: SingleS
 
 def _stations(results: xr.DataTree, states: SingleStates) -> list[Scene]:
     """Return the scenes of stations, with the motions of archived worst cases, then of single realizations."""
-    worst, stations = archived_analysis(results, terms.WORST_CASE), stations_of(results)
+    worst, stations = archived_analysis(results, terms.WORST_CASE), form_scene.stations_of(results)
     for station in stations:
-        if (poses := station_poses(results, station["name"], states)) is not None:
-            cases = worst_poses(results, station["name"], worst)
+        if (poses := form_scene.station_poses(results, station["name"], states)) is not None:
+            cases = form_scene.worst_poses(results, station["name"], worst)
             R, t = (np.concatenate(pair) for pair in zip(cases, poses, strict=True))
             station["motions"] = _motions(R - np.eye(3), t)
     return stations
@@ -194,16 +171,19 @@ def view_of(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) 
     """Return the scene. Without a `nominal` assembly, for a model with faults, it contains only parts with valid shapes."""
     marks = Marks([], [], [], [], []) if nominal is None else marks_of_nominal(nominal)
     previews = {part: image for part in assembly.parts if (image := preview(part)) is not None}
-    faulty = _faulty(assembly, faults)
+    text = "\n".join(faults)
+    pairs = [pair for pair in assembly.pairs if f'"{pair.name}" (' in text]
+    faulty = {face.part.name for pair in pairs for face in (pair.moving, pair.reference)}
+    faulty |= {part.name for part in assembly.parts if f'part "{part.name}"' in text}
     return {
-        "parts": [_drawn_part(part, image, faulty) for part, image in previews.items()],
+        "parts": [_drawn_part(part, image, is_faulty=part.name in faulty) for part, image in previews.items()],
         "toleranced": feature_lists(assembly, {part: image.mesh for part, image in previews.items()}),
-        "stations": stations_of_nominal(nominal),
+        "stations": form_scene.stations_of_nominal(nominal),
         **packed_marks(marks),
     }
 
 
-def gap_rows(nominal: Nominal | None) -> list[dict[str, Any]]:
+def gap_rows(nominal: Nominal | None) -> list[Scene]:
     """Return the smallest and the largest gap of each pair of faces in the nominal assembly."""
     rows = []
     for pair in () if nominal is None else nominal.pairs:
@@ -213,18 +193,10 @@ def gap_rows(nominal: Nominal | None) -> list[dict[str, Any]]:
     return rows
 
 
-def _faulty(assembly: Assembly, faults: Sequence[str]) -> set[str]:
-    """Return the parts that faults name, and the parts of contact pairs that faults name."""
-    text = "\n".join(faults)
-    pairs = [pair for pair in assembly.pairs if f'"{pair.name}" (' in text]
-    of_pairs = {face.part.name for pair in pairs for face in (pair.moving, pair.reference)}
-    return of_pairs | {part.name for part in assembly.parts if f'part "{part.name}"' in text}
-
-
-def _drawn_part(part: Part, image: PartPreview, faulty: set[str]) -> Scene:
+def _drawn_part(part: Part, image: PartPreview, *, is_faulty: bool) -> Scene:
     return {
         "name": part.name,
-        "faulty": part.name in faulty,
+        "faulty": is_faulty,
         "placement": [*image.rotation.ravel().tolist(), *part.at],
         "vertices": packed(image.vertices),
         "faces": packed(image.faces, "i4"),
@@ -254,14 +226,14 @@ def coarser(vertices: np.ndarray, faces: np.ndarray, count: int) -> tuple[np.nda
     return coarse, corners, cKDTree(vertices).query(coarse)[1]
 
 
-def feature_lists(assembly: Assembly, meshes: Meshes) -> list[Entry]:
+def feature_lists(assembly: Assembly, meshes: Meshes) -> list[Scene]:
     """Return the features and patterns of each part that has any. `meshes` contains the meshes of all drawn parts, in order.
 
     number    of the drawn part; None if it is not drawn
     members   the feature itself, or the features of a pattern. The faces of a member consist of `runs` of consecutive triangles
               of the mesh (first triangle, and one after the last), clipped by all `boxes` (lower and upper corner [mm])
     """
-    numbers: Mapping[Part, int] = {part: number for number, part in enumerate(meshes)}
+    numbers = {part: number for number, part in enumerate(meshes)}
     return [
         {
             "part": str(part.name),
@@ -273,24 +245,20 @@ def feature_lists(assembly: Assembly, meshes: Meshes) -> list[Entry]:
     ]
 
 
-def _entry(declared: Feature | Pattern, meshes: Meshes) -> Entry:
+def _entry(declared: Feature | Pattern, meshes: Meshes) -> Scene:
     return {
         "noun": declared.noun,
         "name": str(declared.name),
         "datum": None if declared.datum is None else str(declared.datum),
-        "tolerances": [_text(tolerance) for tolerance in declared.tolerances],
+        # only its kind if a fault prevents printing
+        "tolerances": [one.kind if any(one.faults()) else str(one) for one in declared.tolerances],
         "members": [
             {"name": str(member.name), "faces": list(_faces(member, declared.part, meshes))} for member in declared.members
         ],
     }
 
 
-def _text(tolerance: Size | GeometricTolerance) -> str:
-    """Return a tolerance as printed, or only its kind if a fault prevents printing."""
-    return tolerance.kind if any(tolerance.faults()) else str(tolerance)
-
-
-def _faces(member: Feature, part: Part, meshes: Meshes) -> Iterator[Entry]:
+def _faces(member: Feature, part: Part, meshes: Meshes) -> Iterator[Scene]:
     """Yield the faces of a member that have triangles on its part."""
     for face in member.faces:
         if face.part is part and not any(face.faults()) and all(mentioned in meshes for mentioned in face.parts):
@@ -298,16 +266,8 @@ def _faces(member: Feature, part: Part, meshes: Meshes) -> Iterator[Entry]:
                 indices = triangles(face, meshes)
             except GeometryFault:  # a fault of the model, which the page lists
                 continue
-            yield {"runs": _runs(indices), "boxes": _boxes(face)}
-
-
-def _runs(indices: np.ndarray) -> list[int]:
-    """Return the first index, and one after the last, of each run of consecutive `indices` (index,)."""
-    ends = np.flatnonzero(np.diff(indices) != 1)
-    first, last = indices[np.r_[0, ends + 1]], indices[np.r_[ends, len(indices) - 1]]
-    return [int(index) for index in np.column_stack([first, last + 1]).ravel()]
-
-
-def _boxes(face: Face) -> list[list[list[float]]]:
-    boxes = [selection for selection in face.selections if isinstance(selection, Inside)]
-    return [[[float(x) for x in corner] for corner in (box.lower, box.upper)] for box in boxes]
+            ends = np.flatnonzero(np.diff(indices) != 1)
+            first, last = indices[np.r_[0, ends + 1]], indices[np.r_[ends, len(indices) - 1]]
+            runs = np.column_stack([first, last + 1]).ravel().tolist()
+            boxes = [selection for selection in face.selections if isinstance(selection, Inside)]
+            yield {"runs": runs, "boxes": [[[float(x) for x in end] for end in (box.lower, box.upper)] for box in boxes]}
