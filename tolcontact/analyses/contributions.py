@@ -102,7 +102,8 @@ def _answers(
         shapley: np.ndarray = effects,
     ) -> Answer:  # fmt: skip
         """Return the answer from arrays of `count` base realizations; without any, it has linear shares only."""
-        values: dict[str, Any] = dict.fromkeys(("first", "total"), unknown)
+        values: dict[str, Any] = {}
+        values |= dict.fromkeys(("first", "total"), unknown)
         values |= dict.fromkeys(("minor_total", "missed"), unknown[:, :, 0])
         if count:
             measured, firsts, _ = arrays
