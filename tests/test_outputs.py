@@ -10,7 +10,7 @@ from filelock import FileLock
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
-from tolcontact.replacing import LOCK, PREFIX, temporary_folder
+from tolcontact.temporary import LOCK, PREFIX, temporary_folder
 
 MODEL = """import tolcontact as tc
 from tests import cases

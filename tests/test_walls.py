@@ -43,8 +43,8 @@ NOT_IN = {
 # Who may import a library by a call, when it is first needed: it is optional, or slow to import.
 LAZY = {
     "cloudpickle": ("simulation/packing.py",),
-    "dask": ("simulation/cluster.py", "simulation/packing.py"),
-    "dask.array": ("simulation/packing.py",),
+    "dask": ("simulation/cluster.py", "simulation/lazy.py"),
+    "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
     "pandas": ("declaration/measured_table.py", "declaration/stack.py"),
     "trimesh": ("geometry/files/worker.py",),  # in a process that mostly reads STEP files
@@ -70,9 +70,9 @@ APART = {
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "version", "texts", "errors", "user_functions", "tables", "system", "interrupts", "readable", "child",
+    "version", "texts", "errors", "user_functions", "input_files", "tables", "system", "interrupts", "readable", "child",
     "stored_coordinates", "shape_worker", "kernel", "vocabulary", "realizations", "arrays", "method", "poses", "limits",
-    "code_cache", "replacing", "compiled", "declaration", "select", "geometry", "elasticity", "features",
+    "code_cache", "replacing", "temporary", "compiled", "declaration", "select", "geometry", "elasticity", "features",
     "fasteners", "pmi", "discretization", "interference", "variation", "mechanics", "compilation", "statics", "contact",
     "simulation", "plausibility", "statistics", "archive", "report", "plot", "workflow", "io", "analyses", "testing",
     "cli", "__init__",
@@ -157,7 +157,7 @@ def test_imports_keep_to_the_walls():
 KINDS = {
     "RoundContact": {
         "discretization/__init__.py", "discretization/round_contact.py", "discretization/contact_points.py",
-        "mechanics/round_gap.py",
+        "mechanics/round_gap.py", "mechanics/pair_gaps.py",
     }
 }  # fmt: skip
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from tolcontact import cli, interrupts
-from tolcontact.system import files, machine
+from tolcontact.system import machine, streams
 
 MIN_ADDRESS_SPACE = 1_500_000_000  # bytes
 MIN_GARBAGE = 200_000  # objects: modules hold no garbage, and looking for it takes a fifth of the time of all imports
@@ -17,7 +17,7 @@ def command_line() -> None:
     """Run the command line (see tolcontact.cli)."""
     try:
         with interrupts.stoppable(at_once=True):
-            files.open_closed()
+            streams.open_closed()
             check_address_space()
             check_threads()
             # Linear algebra has one thread: starting more takes longer than a run, and blocks have threads of their own.

@@ -16,6 +16,7 @@ import numpy as np
 import platformdirs
 
 from tolcontact.system import files
+from tolcontact.system.ownership import is_own, is_private
 
 MAX_BYTES = 1 << 28  # of the folder; the least recently used files are deleted
 _DIGEST_BYTES = 32
@@ -25,10 +26,10 @@ def load(key: str) -> bytes | None:
     """Return the code stored under a key; None if it is missing, damaged, or could be somebody else's."""
     path = cache_folder() / key
     with contextlib.suppress(OSError):
-        if not files.is_private(path.parent):
+        if not is_private(path.parent):
             return None
         with files.open_unlinked(path) as file:
-            if not files.is_own(status := os.fstat(file.fileno())) or not stat.S_ISREG(status.st_mode):
+            if not is_own(status := os.fstat(file.fileno())) or not stat.S_ISREG(status.st_mode):
                 return None
             data = file.read()
             with contextlib.suppress(OSError):  # of a file system that is read-only
@@ -52,7 +53,7 @@ def write(key: str, data: bytes) -> bool:
         for each in (*reversed(folder.parents), folder):
             if not each.exists():
                 each.mkdir(mode=0o700, exist_ok=True)
-        if not files.is_private(folder):
+        if not is_private(folder):
             return False
         file = tempfile.NamedTemporaryFile(dir=folder, delete=False)  # noqa: SIM115  (closed before it is moved)
         try:

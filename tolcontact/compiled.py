@@ -13,7 +13,7 @@ from typing import Any
 import numba
 
 from tolcontact import code_cache
-from tolcontact.system.files import is_private
+from tolcontact.system.ownership import is_private
 
 
 def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool = True, inner: bool = False) -> Any:

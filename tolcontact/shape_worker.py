@@ -21,8 +21,8 @@ from typing import Any, Self
 
 from tolcontact.child import environment
 from tolcontact.errors import GeometryFault
+from tolcontact.input_files import fault_of
 from tolcontact.system.processes import TIME_LIMIT, Watch, crash
-from tolcontact.tables import fault_of
 from tolcontact.texts import clipped
 
 PROGRAM = Path(__file__).parent / "geometry" / "files" / "worker.py"

@@ -1,19 +1,15 @@
-"""Files that a command or a model names, and tables and numbers in them: how they are separated, and what counts as a number.
-
-Files are regular and of a bounded size, so that no device or pipe is read without end.
-"""
+"""Tables and numbers in the text files of users: how they are encoded and separated, and what counts as a number."""
 
 import csv
 import itertools
 import re
-import sys
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from tolcontact.input_files import MAX_BYTES, check_inputs
 from tolcontact.texts import clipped
 
-MAX_BYTES = 1 << 30
 MAX_NUMBER = 1e15  # of a length [mm], a force, a stiffness: nothing overflows
 MAX_HEADING_LINES = 20
 EMPTY = "it is empty"
@@ -22,30 +18,6 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?(?:0?,[0-9]+|[0-9]+,(?:[0-9]{1,2}|[0-9]{4,}))(?:[eE][+-]?[0-9]+)?")  # others: thousands
 _AMBIGUOUS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _COMMENT = re.compile(r"\s*#(?:\s|$)")  # "#DIV/0!" is none
-
-
-def fault_of(path: Path, max_bytes: int = sys.maxsize) -> str:
-    """Return what is wrong with an input, in words that follow its name; empty for a regular file of at most `max_bytes`."""
-    try:
-        if not path.exists():
-            return "does not exist"
-        if not path.is_file():
-            return "is a folder, a device or a pipe; expected a regular file"
-        size = path.stat().st_size
-    except (OSError, ValueError) as error:
-        return f"cannot be opened ({getattr(error, 'strerror', None) or 'its name cannot be used'})"
-    return f"has {size} bytes; expected at most {max_bytes}" if size > max_bytes else ""
-
-
-def check_inputs(paths: Iterable[Path], max_bytes: int = MAX_BYTES) -> None:
-    """Raise ValueError unless all paths are regular files, of at most `max_bytes` together."""
-    total = 0
-    for path in paths:
-        if fault := fault_of(path):
-            raise ValueError(f'"{path}" {fault}')
-        total += path.stat().st_size
-    if total > max_bytes:
-        raise ValueError(f"{total} bytes are to be read; expected at most {max_bytes}")
 
 
 class Table(NamedTuple):

@@ -11,7 +11,8 @@ from scipy.sparse.linalg import splu
 import tolcontact as tc
 from studies.tables import Table
 from tolcontact.declaration import Point
-from tolcontact.elasticity.tetrahedra import SurfacePads, stiffness_of
+from tolcontact.elasticity.pads import SurfacePads
+from tolcontact.elasticity.tetrahedra import stiffness_of
 from tolcontact.mechanics.flexibility import elastic_bodies
 from tolcontact.poses import AT_REST
 from tolcontact.simulation import simulate_block

@@ -191,6 +191,10 @@ class Search:
     idle: np.ndarray = field(init=False)  # (group,) whether a group has no known influence on any requirement
     tested_rows: int = field(init=False, default=0)  # number of realizations in the latest test of that
 
+    has_table: np.ndarray = field(init=False)  # (group,) whether the cost of a group is a table of choices
+    least: np.ndarray = field(init=False)  # (group,) the logarithm of the smallest factor that a group may have
+    most: np.ndarray = field(init=False)  # (group,) the logarithm of the largest one
+
     def __post_init__(self) -> None:
         self.idle = self.priced.copy()
         self.has_table = np.array([bool(curve.names) for curve in self.curves])

@@ -1,8 +1,8 @@
 """The base of all analyses: checks, simulations, answers of growing accuracy, groups of contributors, dataset and storage.
 
 An analysis is a sequence of answers. The first ones take little time, and the last one is complete. An analysis that is
-stopped, or whose time ends, leaves its latest answer, which says so. Each is a function that makes the answer from what is
-known when it is called, so an answer that nobody asks for takes no time.
+stopped, or whose time ends, leaves its latest answer, which says so. The answers are given as functions: each makes its answer
+from what is known when it is called, so an answer that nobody asks for takes no time.
 """
 
 import copy
@@ -11,6 +11,7 @@ import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,7 +32,8 @@ from tolcontact.statistics.variance_shares import joined_columns
 from tolcontact.variation import GivenDraws
 from tolcontact.variation.draws import Draws
 from tolcontact.vocabulary import GROUPED_BY
-from tolcontact.workflow.models import Choice, Model, check_affordable, check_counts, program_of
+from tolcontact.workflow.forecast import check_affordable
+from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
 MAX_ROWS_OF_BODIES = 8192  # realizations of a block, times the bodies that contact couples: a block ends within seconds
 MIN_BLOCKS = 8  # for few realizations, so that they occupy all processors
@@ -43,6 +45,7 @@ MIN_STAGE, MIN_BASE = 500, 4  # realizations of the first stage, and its base re
 
 Progress = Callable[[int, int], None]  # called with the number of finished steps, and the total
 Observer = Callable[[Block], tuple[Any, ...]]  # returns arrays of a block; the last one is the statuses (n,)
+Results = Callable[[], list[np.ndarray]]  # returns the joined arrays of an observer
 
 log = logging.getLogger(__name__)
 
@@ -123,6 +126,10 @@ class Analysis:
         self._blocks, self._client = mapping(client), client
         if into is not None:
             check_room_for(into, record, self.program)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Set what depends on the program and on the simulations so far: nothing is simulated, and there is no answer."""
         bodies = max((len(group.group.free) for group in self.program.groups), default=0)
         self._rows = min(block_rows(self.program), max(MAX_ROWS_OF_BODIES // max(bodies, 1), MIN_BLOCKS))
         self.statuses, self.total = np.zeros(len(terms.STATUS_MEANINGS), dtype=int), 0
@@ -140,9 +147,10 @@ class Analysis:
         return int(self.statuses.sum())
 
     def of(self, program: Program) -> "Analysis":
-        """Return the same analysis of another program, without progress, and with nothing simulated."""
+        """Return the same analysis of another program, with nothing simulated: without progress, limit of time and answer."""
         analysis = copy.copy(self)
-        analysis.program, analysis.statuses, analysis.progress = program, np.zeros_like(self.statuses), None
+        analysis.program, analysis.progress, analysis._minutes = program, None, None
+        analysis._begin()
         return analysis
 
     def expect(self, total: int) -> None:
@@ -186,12 +194,15 @@ class Analysis:
 
     def stages(
         self, design: Design, samples: int, *, start: int = 0, observe: Observer = outcomes
-    ) -> Iterator[tuple[int, list[np.ndarray]]]:
-        """Simulate a design in stages; yield the number of base realizations so far, and the results of all of them."""
+    ) -> Iterator[tuple[int, Results]]:
+        """Simulate a design in stages; yield the number of base realizations so far, and a function that returns their results.
+
+        The results of all stages are joined when the function is called: for an answer that is asked for.
+        """
         observed: list[tuple[np.ndarray, ...]] = []
         for first, stop in stages(samples, design.size):
             observed.append(self.simulate_design(design, stop - first, start=start + first, observe=observe))
-            yield stop, [np.concatenate(parts) for parts in zip(*observed, strict=True)]
+            yield stop, partial(_joined, tuple(observed))
 
     def dataset(
         self, values: Mapping[str, Any], labels: Mapping[str, Sequence[str]], *, units: str | None = None, **attributes: Any
@@ -291,6 +302,10 @@ class Analysis:
         """Raise OptionError if nothing varies."""
         if not varies:
             raise OptionError(f'nothing varies in "{self.assembly}"; give it tolerances first')
+
+
+def _joined(observed: Sequence[tuple[np.ndarray, ...]]) -> list[np.ndarray]:
+    return [np.concatenate(parts) for parts in zip(*observed, strict=True)]
 
 
 def stages(samples: int, size: int, *, first: int = 0) -> Iterator[tuple[int, int]]:

@@ -20,7 +20,7 @@ import xarray as xr
 from scipy.special import ndtr, ndtri
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis, Answer, Design, Progress, independent_groups, owners
+from tolcontact.analyses.analysis import Analysis, Answer, Design, Progress, Results, independent_groups, owners
 from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.method import Solver
@@ -98,15 +98,15 @@ def _answers(
     is_minor, totals = unscreened = np.zeros(len(groups), dtype=bool), unknown[..., 0]
 
     def answer(
-        coarse: str, count: int = 0, arrays: Any = None, screening: tuple[np.ndarray, np.ndarray] = unscreened,
+        coarse: str, count: int = 0, results: Results | None = None, screening: tuple[np.ndarray, np.ndarray] = unscreened,
         shapley: np.ndarray = effects,
     ) -> Answer:  # fmt: skip
-        """Return the answer from arrays of `count` base realizations; without any, it has linear shares only."""
+        """Return the answer from the results of `count` base realizations; without any, it has linear shares only."""
         values: dict[str, Any] = {}
         values |= dict.fromkeys(("first", "total"), unknown)
         values |= dict.fromkeys(("minor_total", "missed"), unknown[:, :, 0])
-        if count:
-            measured, firsts, _ = arrays
+        if results is not None:
+            measured, firsts, _ = results()
             values = _indices(measured, program.accuracies, *screening)
             values["missed"] = _missed(program, measured[:, 0], firsts[:, 0], slopes)
         values |= {"minor": screening[0].astype(np.int8), "shapley": shapley, "linear": linear, "by_status": analysis.statuses}
@@ -121,9 +121,9 @@ def _answers(
     yield partial(answer, "linear shares, without contact")
     if analysis.samples > 2 * SCREENING_SAMPLES and len(groups) >= MIN_GROUPS:
         observe = partial(_first_deviations, everything.size)
-        for count, arrays in analysis.stages(everything, SCREENING_SAMPLES, start=START, observe=observe):
-            yield partial(answer, f"a screening with {count} base realizations", count, arrays)
-        is_minor, totals = _screened(arrays[0], program.accuracies)
+        for count, results in analysis.stages(everything, SCREENING_SAMPLES, start=START, observe=observe):
+            yield partial(answer, f"a screening with {count} base realizations", count, results)
+        is_minor, totals = _screened(results()[0], program.accuracies)
     is_screened, screening = analysis.simulated > 0, (is_minor, totals)
     minor = [columns[k] for k in np.flatnonzero(is_minor)]
     major = [columns[k] for k in np.flatnonzero(~is_minor)]
@@ -131,15 +131,15 @@ def _answers(
     if samples is None:
         samples = int(np.clip((BUDGET - analysis.simulated) // size(mixed), MIN_SAMPLES, MAX_SAMPLES))
     analysis.total = analysis.simulated + samples * size(mixed)
-    for count, arrays in analysis.stages(mixed, samples, observe=partial(_first_deviations, mixed.size)):
+    for count, results in analysis.stages(mixed, samples, observe=partial(_first_deviations, mixed.size)):
         if count > SCREENING_SAMPLES or not is_screened or count == samples:
-            yield partial(answer, f"{count} of {samples} base realizations", count, arrays, screening)
+            yield partial(answer, f"{count} of {samples} base realizations", count, results, screening)
     if released:
         measured, _ = analysis.simulate_design(released, samples)
         positions = released.positions(analysis.seed, 0, samples)
         shapley = _by_measure(measured, program.accuracies, lambda f, accuracy: shapley_effects(f, positions, accuracy))
         effects = np.array(shapley)
-    yield partial(answer, "", samples, arrays, screening, effects)
+    yield partial(answer, "", samples, results, screening, effects)
 
 
 def _by_measure(measured: np.ndarray, accuracies: np.ndarray, function: Callable[[np.ndarray, float], Any]) -> list[list[Any]]:

@@ -3,24 +3,24 @@
 A search is a generating set search (Kolda, Lewis, Torczon, 2003). It tries points a step away along each contributor and in
 random directions, and then points on the way to the far end of the region along its slopes. It moves to the best of them if
 the gain is sufficient; otherwise its step shrinks. It ends when its step is small. Searches that meet share simulated points.
+
+A measure with contact is searched along the contributors that have an influence on it. Influences are found before a search, by
+exchanging deviations between points, and again where it ends, since an influence may show only there.
 """
 
-import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.analysis import Analysis
+from tolcontact.analyses.searches import SHRINKAGE, Effort, Searches
 
 RANDOM_DIRECTIONS = 4  # tried by a search at each step
 END_SHARES = 0.5 ** np.arange(9)  # of the way to a far end, for trial points
 WAY_SHARES = np.arange(1, 9) / 8  # of the way to a better end, at which a measure must increase
-SHRINKAGE = 0.25  # of a step
 ROUNDING, STEP_GAIN = 1e-10, 0.01  # of a measure's spread: the least gain is ROUNDING + STEP_GAIN step^2
 MAX_STEPS = 200
 MAX_POLISHES, POLISHING_STEP, POLISHED = 3, 0.25, 0.2  # of the best searches; their first step; ratio of finest steps
@@ -32,35 +32,6 @@ NEGLIGIBLE = 1e-6  # of a measure's spread: smaller changes do not count as infl
 SINGLE = 2  # points with exchanges of one contributor at a time
 MAX_EXCHANGES = 8
 DIFFERENCE_STEP = 1e-4  # of the ranges, for slopes at an end
-Searches = Any  # a record array of searches (n,); its columns are attributes (see begun)
-
-
-@dataclass(frozen=True)
-class Effort:
-    """The thoroughness of searches.
-
-    best, random  number of searches for each extreme value, from the best combinations and from random ones
-    finest_step   the step at which a search ends, in shares of the ranges; the best ones continue to a fifth of that
-    """
-
-    best: int
-    random: int
-    finest_step: float = 0.05
-
-    @classmethod
-    def of(cls, samples: int) -> "Effort":
-        """Return the effort for a number of random combinations: 4 and 8 searches for 1024."""
-        return cls(best=max(samples // 256, 1), random=max(samples // 128, 2))
-
-    @property
-    def searches(self) -> int:
-        """The number of searches for each extreme value."""
-        return self.best + self.random
-
-    @property
-    def levels(self) -> int:
-        """The number of step lengths, from 1 to the finest one."""
-        return math.ceil(math.log(self.finest_step) / math.log(SHRINKAGE))
 
 
 class Evaluation:
@@ -112,34 +83,6 @@ class Evaluation:
         return self._region.deviations(points.reshape(-1, points.shape[-1]))
 
 
-def begun(starts: np.ndarray, measured: np.ndarray, effort: Effort, rng: np.random.Generator) -> Searches:
-    """Return searches (n,) for each measure, state and sense, from points `starts` (n, contributor).
-
-    They start at the best points according to `measured` (n, state, measure), and at random ones among the others. Columns:
-
-    sense, state, measure  +1 for the largest, -1 for the least value, of a measure in a state
-    point                  (contributor,)
-    value                  sense times the measure
-    step                   in shares of the ranges
-    """
-    columns = [("sense", int), ("state", int), ("measure", int), ("value", float), ("step", float)]
-    goals = [*itertools.product(range(measured.shape[2]), range(measured.shape[1]), terms.SENSES)]
-    searches = np.recarray((len(goals), effort.searches), dtype=[*columns, ("point", float, starts.shape[1:])])
-    for of_goal, (measure, state, sense) in zip(searches, goals, strict=True):
-        values = np.nan_to_num(sense * measured[:, state, measure], nan=-np.inf)
-        order = np.argsort(-values, kind="stable")
-        worse = order[effort.best : max(int(np.isfinite(values).sum()), effort.best + 1)]
-        rows = np.concatenate([order[: effort.best], rng.choice(worse, effort.random)])
-        of_goal.sense, of_goal.state, of_goal.measure, of_goal.step = sense, state, measure, 1.0
-        of_goal.value, of_goal.point = values[rows], starts[rows]
-    return searches.reshape(-1)
-
-
-def best_of(searches: Searches, count: int) -> Searches:
-    """Return copies of the best of each `count` consecutive searches."""
-    return searches[searches.value.reshape(-1, count).argmax(axis=1) + np.arange(0, len(searches), count)]
-
-
 class Searcher:
     """Moves searches in a region, along contributors with a known influence on a measure with contact.
 
@@ -170,7 +113,7 @@ class Searcher:
         for _ in range(MAX_RESTARTS):
             self._search(searches, advanced)
             self._meet(searches)
-            best = best_of(searches, self._effort.searches)
+            best = searches.best_of(self._effort.searches)
             points = np.repeat(best.point[best.state == terms.CORRECTED], len(partners), axis=0)
             is_new = self.explore(points, np.resize(partners, points.shape))
             rows = np.flatnonzero(is_new[searches.measure] & (searches.state == terms.CORRECTED))
@@ -238,12 +181,12 @@ class Searcher:
             rows = np.flatnonzero(searches.step > finest_step)
             if not rows.size or self._evaluation.count > limit:
                 break
-            active = searches[rows]
+            active = searches.take(rows)
             candidates, values, slopes = self._neighbours(active, active.step, self._random_steps())
             gains = self._move(active, candidates, values)
             gains |= self._move_towards(active, self._region.farthest(slopes))
             active.step[~gains] *= SHRINKAGE
-            searches[rows] = active
+            searches.put(rows, active)
             steps = np.log(np.maximum(searches.step, finest_step)[searches.state == terms.CORRECTED])
             advanced(float(steps.mean() / math.log(finest_step)))
 
@@ -262,22 +205,22 @@ class Searcher:
     def _meet(self, searches: Searches) -> None:
         """Move searches with contact to the best one of their goal if the measure grows all the way there."""
         count = self._effort.searches
-        best = np.repeat(best_of(searches, count).point, count, axis=0)
+        best = np.repeat(searches.best_of(count).point, count, axis=0)
         rows = np.flatnonzero((searches.state == terms.CORRECTED) & (searches.point != best).any(axis=1))
         if rows.size:
-            behind = searches[rows]
+            behind = searches.take(rows)
             ways = behind.point[:, None] + WAY_SHARES[:, None] * (best[rows] - behind.point)[:, None]
             ways[:, :, self._region.fixed] = best[rows][:, None, self._region.fixed]
             values = np.column_stack([behind.value, self._values_at(behind, ways)])
             ends = np.flatnonzero((np.diff(values, axis=1) >= -ROUNDING * self._spread[behind.measure][:, None]).all(axis=1))
             behind.point[ends], behind.value[ends] = ways[ends, -1], values[ends, -1]
-            searches[rows] = behind
+            searches.put(rows, behind)
 
     def _finish(self, searches: Searches, limit: float) -> None:
         """Move along the slopes to the exact end of round zones; only once if more combinations than `limit` were tried."""
         searches.step[:] = 0.0
         for _ in range(MAX_FINISHES):
-            steps = np.full(len(searches), DIFFERENCE_STEP)
+            steps = np.full(len(searches.value), DIFFERENCE_STEP)
             _, _, slopes = self._neighbours(searches, steps, np.zeros((0, len(self._ranges))))
             ends = [
                 self._region.exactly_farthest(row) if row.any() else point

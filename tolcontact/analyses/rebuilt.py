@@ -1,7 +1,7 @@
-"""What a report asks of the model of a run, rebuilt from its archive.
+"""Values that a report computes with the model of a run, which is rebuilt from the archive.
 
-With too few realizations for shares: the variance that each contributor causes to first order, without contact. With elastic
-parts: the same realizations with rigid ones, for what elasticity adds to the variance of a run.
+Both functions take the results of a run and compile its model once more: `first_order_variances` for the shares of contributors
+where realizations are too few, and `rigid_values` for the part of the variance that elasticity adds.
 """
 
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.archive import method_of_run, model_of
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import compile_program
-from tolcontact.compilation.program import STIFFER, overheld, stiffer
+from tolcontact.compilation.other_flexibility import STIFFER, overheld, stiffer
 from tolcontact.discretization import discretize
 from tolcontact.realizations import finished
 from tolcontact.simulation import simulate_block

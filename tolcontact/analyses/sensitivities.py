@@ -1,6 +1,6 @@
 """Derivatives of each measure with respect to each contributor, with contact."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.analysis import Analysis, Answer, Design, Progress
+from tolcontact.analyses.analysis import Analysis, Answer, Design, Progress, Results
 from tolcontact.analyses.linear_model import leverages, total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.method import Solver
@@ -87,24 +87,25 @@ class SteppedDraws(Design):
 def _answers(analysis: Analysis, columns: np.ndarray, steps: np.ndarray) -> Iterator[Callable[[], Answer]]:
     """Yield answers from more and more realizations; the first one has nominal derivatives only."""
     program, samples = analysis.program, analysis.samples
-    stepped, nominal = SteppedDraws(program.draws, columns, steps), total_derivatives(program)[:, columns]
+    stepped = SteppedDraws(program.draws, columns, steps)
     analysis.expect(samples * stepped.size)
+    nominal = total_derivatives(program)[:, columns]
     unknown = np.full((len(nominal), 2, len(columns), len(terms.ESTIMATE)), np.nan)
     unknown_values = {
         "sensitivity": unknown, "spread": unknown[..., 0], "by_contact": unknown, "changing": unknown[0, 0],
         "by_status": np.zeros(len(terms.STATUS_MEANINGS), dtype=int),
     }  # fmt: skip
 
-    def answer(count: int, arrays: Sequence[np.ndarray] = ()) -> Answer:
-        values = _values(program, steps, nominal, *arrays) if count else unknown_values
+    def answer(count: int, results: Results | None = None) -> Answer:
+        values = unknown_values if results is None else _values(program, steps, nominal, *results())
         values = {"nominal": nominal, "leverage": leverages(program)[columns], "step": steps, **values}
         labels = {terms.CONTRIBUTOR: [program.nominal.contributors[column] for column in columns]}
         coarse = f"{count} of {samples} realizations" if count else "nominal derivatives, without contact"
         return Answer(values, labels, {"realizations": count, "simulated": count * stepped.size}, coarse)
 
     yield partial(answer, 0)
-    for count, arrays in analysis.stages(stepped, samples, observe=_observed):
-        yield partial(answer, count, arrays)
+    for count, results in analysis.stages(stepped, samples, observe=_observed):
+        yield partial(answer, count, results)
 
 
 def _values(

@@ -10,8 +10,9 @@ import xarray as xr
 from tolcontact import poses, vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.analysis import Analysis, Answer, Progress
-from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher, Searches, begun, best_of
+from tolcontact.analyses.extreme_search import Evaluation, Searcher
 from tolcontact.analyses.linear_model import LinearModel, farthest_poses, linear_model
+from tolcontact.analyses.searches import Effort, Searches
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.features.freedoms import FORM
@@ -95,11 +96,11 @@ def _answers(analysis: Analysis, effort: Effort) -> Iterator[Callable[[], Answer
     if not np.isfinite(measured[:, terms.CORRECTED]).any():
         raise OptionError(f'"{analysis.assembly}" cannot be resolved for any of {len(starts)} combinations tried')
     spread = np.nanmax(measured, axis=(0, 1)) - np.nanmin(measured, axis=(0, 1))
-    searches, bound = begun(starts, measured, effort, rng), farthest_poses(program, region, linear)
+    searches, bound = Searches.begin(starts, measured, effort, rng), farthest_poses(program, region, linear)
     random = np.stack([np.nanmin(measured, axis=0), np.nanmax(measured, axis=0)], axis=-1).swapaxes(0, 1)
 
     def answer(best: Searches | None = None) -> Answer:
-        best = best_of(searches, effort.searches) if best is None else best
+        best = best or searches.best_of(effort.searches)
         values = _extremes(program, region, effort, spread, searches, best)
         values |= {"bound": bound, "random": random, "by_status": analysis.statuses}
         cases = [f"{end} {measure.name}" for measure in program.nominal.measures for end in terms.ENDS]
@@ -126,7 +127,7 @@ def _extremes(
     values = searches.value.reshape(-1, effort.searches)
     tolerances = END_TOLERANCE * spread[best.measure]
     ends = 1 + (np.diff(np.sort(values[:, effort.best :], axis=1), axis=1) > tolerances[:, None]).sum(axis=1)
-    corrected = best[best.state == terms.CORRECTED]
+    corrected = best.take(np.flatnonzero(best.state == terms.CORRECTED))
     shape = (len(program.nominal.measures), len(terms.STATES), len(terms.ENDS))
     return {
         "worst": (best.sense * best.value).reshape(shape),

@@ -7,16 +7,15 @@ from .reader import (
     open_unchecked as open_unchecked,
     opened as opened,
 )
-from .settings import Run as Run, run_settings as run_settings
-from .variables import (
+from .rows import (
     Row as Row,
     bytes_of_rows as bytes_of_rows,
     kept_rows as kept_rows,
-    labelled as labelled,
     row_values as row_values,
     size_in_words as size_in_words,
-    sizes_of_rows as sizes_of_rows,
 )
+from .settings import Run as Run, run_settings as run_settings
+from .variables import labelled as labelled, sizes_of_rows as sizes_of_rows
 from .writer import (
     ArchiveWriter as ArchiveWriter,
     check_room_for as check_room_for,

@@ -11,7 +11,7 @@ from tolcontact.discretization import Nominal
 from tolcontact.features import FaceDeviation
 from tolcontact.features.associated_features import TERMS
 from tolcontact.geometry import surface_arrays
-from tolcontact.mechanics.correction import central_moments
+from tolcontact.mechanics.displacement import central_moments
 from tolcontact.vocabulary import ArchiveVariable
 
 Values = dict[ArchiveVariable, Any]
@@ -23,7 +23,7 @@ NUMBERS = (
 
 
 def contact_values(program: Program) -> Values:
-    """Return the values of the group; none that say nothing about the model."""
+    """Return the values of the group: which parts touch, and where. A variable that does not apply to the model is left out."""
     nominal, pairs = program.nominal, program.nominal.pairs
     values: Values = {
         terms.MOVING_PART: [nominal.number(pair.moving) for pair in pairs],

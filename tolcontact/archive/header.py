@@ -9,16 +9,17 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.archive import settings
 from tolcontact.archive.contact_values import Values, contact_values, face_numbers
-from tolcontact.archive.settings import Run, elastic_parts, stiffness_hash
-from tolcontact.archive.variables import Row, define, kept_rows, labels_of_rows, units_of_rows
+from tolcontact.archive.elastic_values import elastic_values
+from tolcontact.archive.rows import Row, kept_rows
+from tolcontact.archive.settings import Run
+from tolcontact.archive.variables import define, labels_of_rows, units_of_rows
 from tolcontact.compilation import Program
 from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.geometry import known_surfaces, surface_arrays
 from tolcontact.geometry.triangle_mesh import COORDINATE_SPACING, coordinate_spacing
-from tolcontact.poses import AT_REST
-from tolcontact.simulation.bodies import locator_variations
-from tolcontact.simulation.run_checks import compared_objectives, empty_by_objective
+from tolcontact.simulation.locator_offsets import locator_variations
+from tolcontact.simulation.other_objectives import compared_objectives, empty_by_objective
 from tolcontact.vocabulary import ArchiveVariable
 
 # A group, and the values of variables that it gets; None for what is written block by block.
@@ -57,6 +58,12 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
 
 
 def _entries(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequence[int]) -> Entries:
+    """Yield all groups with the values of their variables.
+
+    The caller defines the variables of an entry before it asks for the next one. So their order in the file is the order of
+    these entries, and units that depend on the model are set between two entries: after the variables that have them are
+    defined. A group may occur in several entries.
+    """
     nominal, rows = program.nominal, kept_rows(program.nominal, run.keep)
     labels = labels_of_rows(nominal)
     file.createDimension(terms.REALIZATION, None)
@@ -174,50 +181,11 @@ def _sample(group: netCDF4.Group, program: Program, rows: Sequence[Row]) -> Entr
 
 
 def _elastic(group: netCDF4.Group, program: Program, rows: Sequence[Row]) -> Entries:
-    """Yield the loads between elastic parts and their flexibility: gaps and measures of bent parts follow from them."""
-    nominal, count = program.nominal, len(program.nominal.loads)
-    group.createDimension(terms.LOADS, count)
+    nominal = program.nominal
+    group.createDimension(terms.LOADS, len(nominal.loads))
     group.createDimension(terms.WELD_ROWS, nominal.input_count - len(nominal.contributors))
     yield group, {row.variable: None for row in rows if row.group == terms.ELASTIC_GROUP}
-    starts = np.cumsum([0, *(len(pair.P_m) for pair in nominal.pairs)])
-    pairs, points = nominal.loads.T
-    C, opening = np.zeros((count, count)), np.zeros(count)
-    for flexibility in (compiled.qp.flexibility for compiled in program.groups):
-        if flexibility is not None:
-            at, load_rows = flexibility.loads, flexibility.load_rows
-            C[np.ix_(at, at)], opening[at] = flexibility.C[np.ix_(load_rows, load_rows)], flexibility.opening[load_rows]
-    by_load, by_forces = _measured(program)
-    parts = elastic_parts(nominal)
-    values: Values = {
-        terms.POINT_OF_LOAD: starts[pairs] + points,
-        terms.WELD_OF_LOAD: [_weld_row(nominal, k, point) for k, point in nominal.loads.tolist()],
-        terms.HOLDS: [nominal.pairs[k].holds for k in pairs],
-        terms.FLEXIBILITY: C,
-        terms.OPENING: opening,
-        terms.MEASURED_BY_LOAD: by_load.T,
-        terms.MEASURED_BY_FORCES: by_forces,
-        terms.ELASTIC_LABEL: [part.name for part in parts],
-        terms.ELASTIC_SOURCE: [str(part.part.elasticity) for part in parts],
-        terms.ELASTIC_HASH: [stiffness_hash(part) for part in parts],
-    }
-    yield group, values
-
-
-def _weld_row(nominal: Nominal, pair: int, point: int) -> int:
-    """Return the number of the weld row whose gap a point of a pair keeps, -1 for none."""
-    offsets, first = nominal.pairs[pair].offsets, len(nominal.contributors)
-    column = offsets.columns[offsets.matrix[:, point] != 0]
-    return int(column[0]) - first if column.size and column[0] >= first else -1
-
-
-def _measured(program: Program) -> tuple[np.ndarray, np.ndarray]:
-    """Return the elastic change of measures by the unit of each load (load, measure), and by the constant forces (measure,)."""
-    assert program.observe_bent is not None
-    loads = np.concatenate([np.zeros((1, len(program.nominal.loads))), np.eye(len(program.nominal.loads))])
-    poses = np.tile(AT_REST, (len(loads), len(program.nominal.parts)))
-    deviations = np.zeros((len(loads), len(program.nominal.contributors)))
-    values = program.observe_bent(poses=poses, deviations=deviations, loads=loads)["measured"]
-    return values[1:] - values[0], values[0] - program.nominal_measures
+    yield group, elastic_values(program)
 
 
 def empty_checks(count: int, pairs: int) -> dict[ArchiveVariable, np.ndarray]:

@@ -19,11 +19,11 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.child import ChildDiedError, run_child
 from tolcontact.errors import ArchiveError
+from tolcontact.input_files import fault_of
 from tolcontact.system import files
 from tolcontact.system.machine import limit_resources
-from tolcontact.tables import fault_of
 from tolcontact.texts import CONTROL_CHARACTERS, shown
-from tolcontact.vocabulary import ArchiveVariable, archive, variation
+from tolcontact.vocabulary import ArchiveVariable, archive, elastic, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time
 MEMORY = 1 << 30  # in addition to four times the size of the file
@@ -76,7 +76,7 @@ CHECKED_GROUPS = (
 )
 VARIABLES = {  # by name; no two variables of an archive differ that have one name
     variable.name: variable
-    for module in (archive, variation)
+    for module in (archive, elastic, variation)
     for item in vars(module).values()
     for variable in (item if isinstance(item, tuple) else (item,))
     if isinstance(variable, ArchiveVariable)

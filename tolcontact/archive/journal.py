@@ -21,7 +21,7 @@ from filelock import FileLock, Timeout
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive.inspection import check_name
-from tolcontact.archive.variables import Row
+from tolcontact.archive.rows import Row
 from tolcontact.errors import ArchiveError, OptionError
 from tolcontact.replacing import remove_abandoned, replacing
 from tolcontact.system import files

@@ -2,6 +2,7 @@ from . import (
     analysis_command as analysis_command,
     app as app,
     archives as archives,
+    compare as compare,
     models as models,
     run as run,
     step_files as step_files,

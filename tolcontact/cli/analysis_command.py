@@ -12,7 +12,8 @@ from tolcontact import analyses, interrupts
 from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
 from tolcontact.cli.analyses import COMMANDS, REQUIRED, AnalysisCommand
-from tolcontact.cli.output import console, print_csv, print_data, shown_progress
+from tolcontact.cli.output import console, print_csv, print_data
+from tolcontact.cli.progress import shown_progress
 from tolcontact.report import analysis_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.models import DEFAULT_SOLVER, is_archive

@@ -19,7 +19,7 @@ from tolcontact import cli, interrupts, shape_worker
 from tolcontact.cli import analyses
 from tolcontact.errors import OptionError, TolcontactError
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
-from tolcontact.system import files
+from tolcontact.system import streams
 from tolcontact.texts import shown
 from tolcontact.version import __version__
 
@@ -32,7 +32,10 @@ COMMANDS = {
     **{command.name: ("analysis_command", command.purpose) for command in analyses.COMMANDS},
     "summary": ("archives", "Print the statistics of an archive."),
     "report": ("archives", "Write a self-contained page for a browser from an archive, or a spreadsheet of its tables."),
-    "compare": ("run", "Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other."),
+    "compare": (
+        "compare",
+        "Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other.",
+    ),
     "new": ("models", "Write a small model with comments as a starting point."),
     "guide": ("models", "Open the installed guide in the browser: tutorials, how-tos, theory, reference, glossary."),
     "check": ("models", "Check a model and its options without a run; list all faults and probable mistakes."),
@@ -188,7 +191,7 @@ def main(assembly: "Callable[[], Assembly]") -> None:
 
 def command_line(arguments: list[str] | None = None) -> None:
     """Run `app` as the console script; an error prints one message and gives exit code 2."""
-    files.escape_unprintable()
+    streams.escape_unprintable()
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning

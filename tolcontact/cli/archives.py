@@ -21,8 +21,8 @@ from tolcontact.cli.output import (
     print_data,
     print_summary,
     title_entries,
-    waiting,
 )
+from tolcontact.cli.progress import waiting
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
 

@@ -11,7 +11,8 @@ import typer
 
 from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
-from tolcontact.cli.output import check_outputs, waiting
+from tolcontact.cli.output import check_outputs
+from tolcontact.cli.progress import waiting
 from tolcontact.cli.step_files import without_annotations
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP
@@ -98,12 +99,16 @@ def check(
     for part in program.nominal.last_parts:
         size = " x ".join(f"{length:.4g}" for length in part.body.extents.round(9))
         common.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
-    pairs = program.nominal.pairs
-    lines = [*program.elastic_parts_in_words, *(f"  {remark}" for remark in elastic)]
-    lines += [f"contact {pair.name}: {program.contact_in_words(k)}" for k, pair in enumerate(pairs)]
-    lines += [*program.draws.in_words, *filter(None, [program.stored_coordinates])]
-    for line in lines if program.nominal.assembly.forces or all(pair.stays.all() for pair in pairs) else [*lines, PRESS]:
+    for line in (*program.elastic_parts_in_words, *(f"  {remark}" for remark in elastic)):
         common.echo(f"  {line}")
+    for k, pair in enumerate(program.nominal.pairs):
+        common.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
+    for line in program.draws.in_words:
+        common.echo(f"  {line}")
+    if program.stored_coordinates:
+        common.echo(f"  {program.stored_coordinates}")
+    if not program.nominal.assembly.forces and not all(pair.stays.all() for pair in program.nominal.pairs):
+        common.echo(f"  {PRESS}")
     if drawing:
         _print_remarks(program.nominal)
     common.show_warnings(doubts)

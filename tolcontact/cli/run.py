@@ -1,9 +1,7 @@
-"""tolcontact run, tolcontact compare."""
+"""tolcontact run."""
 
-import contextlib
 import functools
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -12,25 +10,20 @@ from xarray import Dataset
 
 import tolcontact
 from tolcontact import report as reports
-from tolcontact.archive import Run, locked_archive, open_archive, open_unchecked, replacing_archive
+from tolcontact.archive import Run, open_unchecked
 from tolcontact.cli import app as common, output
-from tolcontact.cli.output import print_summary, shown_progress, stopped
-from tolcontact.declaration.script import load_model
+from tolcontact.cli.output import print_summary
+from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.errors import OptionError
-from tolcontact.method import OBJECTIVES, RESOLUTIONS
-from tolcontact.replacing import temporary_folder
 from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
-from tolcontact.system import files
+from tolcontact.temporary import temporary_folder
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS, STACK_UP
 from tolcontact.workflow.accessor import summarize
-from tolcontact.workflow.comparison import compare as compare_solvers, compare_runs, named_archives
 from tolcontact.workflow.models import DEFAULT_SOLVER
 from tolcontact.workflow.runs import SURFACES, Target, write_run
 
 MAX_STACK = 100_000  # realizations of the table of a stack
-SEVERAL = "One or more of {}. Default: the model's."
-MODEL_OPTIONS = ("solvers", "samples", "seed", "resolution", "objective", "workers", "scheduler")
 Until = Annotated[
     str | None,
     typer.Option(
@@ -147,87 +140,3 @@ def _print_results(summary: Summary, stack: Dataset | None, out: Path | None, sh
         if quiet:  # otherwise the log has already stated it
             common.echo(shortfall, err=True)
         raise typer.Exit(1)
-
-
-@common.app.command(
-    epilog=common.examples(
-        "compare model.py --solvers daqp,qpoases", "compare model.py --resolution linearized,exact",
-        "compare before.nc after.nc --report both.html",
-    )
-)  # fmt: skip
-def compare(
-    context: typer.Context,
-    inputs: Annotated[
-        list[Path],
-        typer.Argument(metavar="MODEL.py | FILE.nc FILE.nc ...", help="A model, or archives; the first is the reference."),
-    ],
-    solvers: Annotated[
-        str, typer.Option(help="Names of solvers, separated by commas; the first one is the reference.")
-    ] = DEFAULT_SOLVER,
-    samples: common.Samples = 1000,
-    seed: common.Seed = 1,
-    resolution: Annotated[str | None, typer.Option(help=SEVERAL.format(common.or_(RESOLUTIONS)))] = None,
-    objective: Annotated[str | None, typer.Option(help=SEVERAL.format(common.or_(OBJECTIVES)))] = None,
-    workers: common.Workers = None,
-    scheduler: common.Scheduler = None,
-    as_json: common.AsJson = False,
-    out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write the comparison to a new netCDF file.")] = None,
-    report: Annotated[
-        Path | None, typer.Option(metavar="FILE.html", help="For archives: also write a page for a browser.")
-    ] = None,
-    overwrite: common.Overwrite = False,
-) -> None:
-    """Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other.
-
-    For a model, print agreement, failures, residuals and time. For archives, print how measurements change.
-    """
-    are_archives = [path.suffix.lower() == ".nc" for path in inputs]
-    if not all(are_archives) and len(inputs) > 1:
-        raise OptionError(f"{', '.join(map(str, inputs))} are neither one model nor archives (.nc)")
-    options = [name for name in MODEL_OPTIONS if name in common.set_options(context)]
-    if all(are_archives) and options:
-        raise OptionError(f"--{options[0]} applies to a model; archives have their own")
-    if report is not None and not all(are_archives):
-        raise OptionError("--report applies to archives; write an archive for each solver (run --out), and compare these")
-    output.check_outputs(inputs, archive=out, page=report, overwrite=overwrite)
-    with contextlib.nullcontext() if out is None else locked_archive(out, overwrite=overwrite) as path:
-        if all(are_archives):
-            comparison = _compare_archives(inputs, report)
-        else:
-            methods = [
-                common.method_choices(resolution=name, objective=goal)
-                for name in _names(resolution)
-                for goal in _names(objective)
-            ]
-            with client_of(workers, scheduler) as client:
-                comparison = compare_solvers(
-                    load_model(inputs[0]), _listed(solvers), samples=samples, seed=seed, methods=methods, client=client
-                )
-        if path is not None:
-            # Texts as characters: HDF5's variable-length strings crash some versions of the netCDF library.
-            texts = {name: {"dtype": "S1"} for name in comparison.variables if comparison[name].dtype.kind == "U"}
-            with replacing_archive(path) as part:
-                comparison.to_netcdf(files.plain_path(part), engine="netcdf4", encoding=texts)
-    if as_json:
-        output.print_data(comparison)
-    else:
-        output.console().print((reports.runs_text if all(are_archives) else reports.comparison_text)(comparison))
-        if report is not None:
-            common.echo(f"\nreport: {report}")
-
-
-def _compare_archives(archives: Sequence[Path], report: Path | None) -> Dataset:
-    with contextlib.ExitStack() as stack:
-        runs = {name: stack.enter_context(open_archive(path)) for name, path in named_archives(archives).items()}
-        comparison = compare_runs(runs)
-        if report is not None:
-            reports.write_comparison(runs, comparison, report)
-    return comparison
-
-
-def _names(text: str | None) -> Sequence[str | None]:
-    return [None] if text is None else _listed(text)
-
-
-def _listed(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]

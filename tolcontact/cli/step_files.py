@@ -18,13 +18,15 @@ from rich.table import Table
 from rich.text import Text
 
 from tolcontact.cli.app import AsJson, StepFile, app, echo, examples, flag, only_one
-from tolcontact.cli.output import console, waiting
+from tolcontact.cli.output import console
+from tolcontact.cli.progress import waiting
 from tolcontact.errors import OptionError
 from tolcontact.geometry import bodies_in, faces_in, group_lines
 from tolcontact.geometry.listing import FacesOfRecords
 from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
 from tolcontact.pmi.claims import Annotation
-from tolcontact.pmi.declared import DeclaredFile, declared_file, script
+from tolcontact.pmi.declared import DeclaredFile, declared_file
+from tolcontact.pmi.script import script
 from tolcontact.report.table import FILE_WIDTH
 from tolcontact.texts import clipped, csv_cell, shown, shown_name
 

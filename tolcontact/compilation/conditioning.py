@@ -22,20 +22,20 @@ IDLE_DISTANCE = 1e3  # lengths of the group: bound of an empty row, which is nev
 
 
 def conditioned(
-    system: GroupEquations, Q: ca.SX, gradient: ca.SX, rows: Rows, misfit: ca.SX, scale: ca.SX, call: Call
+    system: GroupEquations, Q: ca.SX, gradient: ca.SX, rows: Rows, locator_misfit: ca.SX, scale: ca.SX, call: Call
 ) -> dict[str, ca.SX]:
     """Return the QP min 1/2 y'Hy + g'y with lba <= a y <= uba, in y = (U z, slacks), and the `length` of the unscaled rows.
 
-    The `misfit` (locator, 1) [mm] of exact two-sided locators gives the last rows, which are equations. A compliant row has its
-    own slack without a price, after the slacks of the pairs. With the opening sqrt(C), this slack adds C times the multiplier
-    to the gap. Slacks of elastic parts are left out, see ContactQP. `scale` is the scale of the objective.
+    The `locator_misfit` (locator, 1) [mm] of exact two-sided locators gives the last rows, which are equations. A compliant row
+    has its own slack without a price, after the slacks of the pairs. With the opening sqrt(C), this slack adds C times the
+    multiplier to the gap. Slacks of elastic parts are left out, see ContactQP. `scale` is the scale of the objective.
     """
-    pairs, springs, equations = len(system.group.pairs), rows.springs, misfit.numel()
+    pairs, springs, equations = len(system.group.pairs), rows.springs, locator_misfit.numel()
     H, to_z = unit_blocks(Q, call)
     opening = ca.SX.ones(len(rows)) * SLACK
     for k in springs:
         opening[k] = ca.sqrt(rows.compliance[k] * scale)
-    A, opening, lower, length = conditioned_rows(rows, to_z, opening, system.group.length, call)
+    A, scaled_opening, lower, length = conditioned_rows(rows, to_z, opening, system.group.length, call)
     upper = ca.SX(ca.DM(np.full(len(rows), np.inf)))
     # Slacks of springs follow those of the pairs. The slack of a pair without rigid rows is in no row, and has no price.
     owners, is_rigid = rows.pairs.copy(), np.ones(len(rows), dtype=bool)
@@ -45,11 +45,11 @@ def conditioned(
         priced = priced[:pairs]
         upper = ca.vertcat(*(lower[k] if holds else np.inf for k, holds in enumerate(rows.flexibility.holds)))
     opens = ca.sparsify(ca.DM(np.equal.outer(owners, range(len(priced))).astype(float)))
-    targets = -system.at_rest(misfit)
+    B, targets = system.slope(locator_misfit) @ to_z, -system.at_rest(locator_misfit)
     return {
         "h": ca.diagcat(H, ca.SX.eye(len(priced))),
         "g": ca.vertcat(to_z.T @ gradient, ca.DM(priced.astype(float)) * system.group.length),
-        "a": ca.blockcat([[A, ca.diag(opening) @ opens], [system.slope(misfit) @ to_z, ca.SX(equations, len(priced))]]),
+        "a": ca.blockcat([[A, ca.diag(scaled_opening) @ opens], [B, ca.SX(equations, len(priced))]]),
         "lba": ca.vertcat(lower, targets),
         "uba": ca.vertcat(upper, targets),
         "to_z": to_z,
@@ -58,7 +58,7 @@ def conditioned(
 
 
 def conditioned_rows(rows: Rows, to_z: ca.SX, opening: ca.SX, group_length: Number, call: Call) -> list[ca.SX]:
-    """Return A, opening, lower and length (row, 1) of rows A y + opening s >= lower of length 1 in y, with z = to_z y.
+    """Return A, scaled openings o, lower and length (row, 1) of rows A y + o s >= lower of length 1 in y, with z = to_z y.
 
     Multipliers are then in the norm of the objective, however weakly it constrains a degree of freedom. A slack of 1 mm adds
     `opening` (row, 1) [mm] to a gap. `length` is the length of the unscaled rows. The rows of empty slots are idle.

@@ -30,7 +30,8 @@ from tolcontact.compilation.qp_terms import (
     spring_energy,
 )
 from tolcontact.discretization import Nominal
-from tolcontact.mechanics.correction import FREEDOMS, MOMENTS, linear, published, rigid
+from tolcontact.mechanics.correction import FREEDOMS, linear, published, rigid
+from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.flexibility import Flexibility
 from tolcontact.mechanics.group_equations import GroupEquations, face_heights, face_poses
 from tolcontact.mechanics.groups import Group, curved_pairs

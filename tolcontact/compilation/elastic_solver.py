@@ -72,10 +72,7 @@ class ElasticSolver:
         is_huge = np.abs(forces).max(axis=1, initial=0) > self._length / SLACK  # more than the price of slacks
         for k in np.flatnonzero((status == INFEASIBLE) | is_huge):
             system = tuple(array[k] for array in systems)
-            _, _, A, b = system
-            gaps, first = A @ x[k] + self._C @ forces[k] + b, len(b) - self._equations
-            gaps[:first] = np.where(forces[k][:first] > 0, gaps[:first], np.minimum(gaps[:first], 0))
-            if status[k] == SOLVED and np.abs(gaps).max(initial=0) < ACCURACY:  # rows under load closed, others not inside
+            if status[k] == SOLVED and self._misfit(system, x[k], forces[k]) < ACCURACY:
                 continue
             increments, slacks_there, reactions_there, outcome = self._nearest(system)
             if self._is_ray(system, forces[k], reactions_there):
@@ -112,6 +109,13 @@ class ElasticSolver:
                 row, column = self._a[:, entry]
                 lam_x[:, column] -= problem["a"][:, entry] * lam_a[:, row]
         return lam_x
+
+    def _misfit(self, system: tuple[np.ndarray, ...], x: Float[Array, " n"], forces: Float[Array, " row"]) -> float:
+        """Return how far [mm] rows under load are from closed, and others inside."""
+        _, _, A, b = system
+        gaps, first = A @ x + self._C @ forces + b, len(b) - self._equations
+        gaps[:first] = np.where(forces[:first] > 0, gaps[:first], np.minimum(gaps[:first], 0))
+        return float(np.abs(gaps).max(initial=0))
 
     def _is_ray(self, system: tuple[np.ndarray, ...], ray: Float[Array, " row"], limits: Float[Array, " row"]) -> bool:
         """Return whether a ray proves that nothing opens all rows: no increments up to the length, no reactions up to `limits`.

@@ -14,13 +14,14 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.compilation.qp_terms import Call, QuadraticTerms, Rows, contact_rows, quadratic_terms, relative_poses
-from tolcontact.mechanics.correction import FREEDOMS, MOMENTS, Motion, linear
+from tolcontact.mechanics.correction import FREEDOMS, Motion, linear
+from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap import RowPoints
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.groups import Group
 from tolcontact.mechanics.objective import objective_scale
+from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.pose import Pose, poses_of
-from tolcontact.mechanics.round_gap import pair_gaps
 from tolcontact.method import Method
 
 MIN_MOVERS = 6  # smaller groups have Functions without calls

@@ -3,7 +3,7 @@
 import logging
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -35,10 +35,10 @@ from tolcontact.mechanics.flexibility import (
 from tolcontact.mechanics.group_equations import face_poses, facing_pose
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
+from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.placement import raw_poses
 from tolcontact.mechanics.pose import ENTRIES, poses_of
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
-from tolcontact.mechanics.round_gap import pair_gaps
 from tolcontact.method import Method
 from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured
@@ -46,8 +46,6 @@ from tolcontact.variation import Draws
 
 log = logging.getLogger(__name__)
 WATCH_DRAWS = 64  # that bound the motion of bodies
-STIFFER = 1e9  # times the stiffness: rigid in any figure
-SAME = 1e-9  # relative: equations that are equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,10 +193,10 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             meetings=meetings,
             trials=trials,
             groups=tuple(
-                _contact_group(nominal, group, method, [standing[k] for k in group.pairs], elastic, choice) for group in groups
+                compiled_group(nominal, group, method, [standing[k] for k in group.pairs], elastic, choice) for group in groups
             ),
             bending=bending,
-            observe_bent=_bent_measures(nominal, bending) if bending else None,
+            observe_bent=bent_measures(nominal, bending) if bending else None,
             accuracies=measure_accuracies(nominal, groups, draws, place, observe),
             watch=watch.allowing(allowed_depths(nominal, meetings, trials)),
             nominal_measures=observe(poses=nowhere, deviations=undeviated)["measured"][0],
@@ -227,7 +225,7 @@ def _observe(nominal: Nominal, entries: ca.SX, deviations: ca.SX, values: Sequen
     )
 
 
-def _bent_measures(nominal: Nominal, bending: Bending) -> NamedFunction:
+def bent_measures(nominal: Nominal, bending: Bending) -> NamedFunction:
     """Return the function of the measures of bent parts, see Program."""
     entries, deviations = ca.SX.sym("poses", ENTRIES * len(nominal.parts)), ca.SX.sym("deviations", len(nominal.contributors))
     values = ca.vertcat(*measured(nominal, poses_of(entries), deviations, bending))
@@ -241,49 +239,10 @@ def _watch(nominal: Nominal, draws: Draws, place: NamedFunction) -> Watch:
     return Watch(nominal, {}, poses, deviations)
 
 
-def _contact_group(
+def compiled_group(
     nominal: Nominal, group: Group, method: Method, standing: Standing, parts: Sequence[PartFlexibility], solver: SolverChoice
 ) -> ContactGroup:
     """Compile a group, with the flexibility of its elastic parts."""
     flexibility = group_flexibility(nominal, group, list(map(row_count, standing)), parts)
     qp = contact_qp(nominal, group, method, standing, flexibility=flexibility)
     return ContactGroup(group, qp, ContactSolver(qp, solver))
-
-
-def with_flexibility(program: Program, parts: Sequence[PartFlexibility]) -> Program:
-    """Return the program with another flexibility of its elastic parts; contact points and constant forces stay."""
-    nominal, bending = program.nominal, Bending(program.nominal, parts)
-    groups = tuple(
-        _contact_group(nominal, compiled.group, program.method, compiled.qp.standing, parts, program.solver)
-        for compiled in program.groups
-    )
-    return replace(program, groups=groups, bending=bending, observe_bent=_bent_measures(nominal, bending))
-
-
-def stiffer(program: Program, factor: float) -> Program:
-    """Return the program with elastic parts of `factor` times the stiffness."""
-    parts = program.bending.parts.values() if program.bending else ()
-    scaled = ("C", "opening", "moved", "surface")
-    return with_flexibility(
-        program, [part._replace(**{name: getattr(part, name) / factor for name in scaled}) for part in parts]
-    )
-
-
-def overheld(program: Program) -> str:
-    """Return the names of pairs that hold parts by more equations than these have freedoms; empty if none do."""
-    for group in program.groups:
-        rows, names = [], dict[str, None]()
-        for pair in (program.nominal.pairs[k] for k in group.group.pairs):
-            if not (pair.holds and pair.elastic):
-                continue
-            names[pair.name] = None
-            for P_m, n in zip(pair.P_m, pair.n_r, strict=True):
-                row = np.zeros((len(program.nominal.parts), 6))
-                row[pair.moving] = [*n, *np.cross(P_m, n) / group.group.length]
-                if pair.reference is not None:
-                    row[pair.reference] = -row[pair.moving]
-                rows.append(row.ravel())
-        if rows and np.linalg.matrix_rank(rows, tol=SAME * len(rows)) < len(rows):
-            first, *others = names
-            return f'"{first}"' + (f" and {len(others)} more" if others else "")
-    return ""

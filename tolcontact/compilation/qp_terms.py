@@ -14,8 +14,8 @@ from tolcontact.mechanics.flexibility import Flexibility
 from tolcontact.mechanics.gap import RowPoints
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.objective import energy, proximity
+from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.mechanics.pose import ENTRIES, Pose, congruent
-from tolcontact.mechanics.round_gap import pair_gaps
 from tolcontact.method import Method
 
 SLOTS, MANY_SLOTS = 8, 12  # of a pair of bounded faces, and of others; at most six independent rows can be active

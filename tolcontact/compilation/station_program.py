@@ -47,15 +47,21 @@ def station_programs(nominal: Nominal, groups: Sequence[Group], method: Method) 
         yield StationProgram(scene.station, parts, pairs, station_groups, sources, place)
 
 
+def _rigid(X: Pose, vertices: np.ndarray) -> Pose:
+    """Return the nearest rigid pose of a stretched part with vertices (vertex, 3) [mm]; it keeps the centre of the part."""
+    centre, R = ca.DM((vertices.min(axis=0) + vertices.max(axis=0)) / 2), nearest_rotation(X.R)
+    return Pose(R, X.t + (X.R - R) @ centre)
+
+
 def _place(nominal: Nominal, station: str, pairs: np.ndarray, sources: np.ndarray, method: Method) -> NamedFunction:
     """Return the function that places the parts of a station; see StationProgram."""
     entries = ca.SX.sym("poses", ENTRIES * len(sources))
     deviations = ca.SX.sym("deviations", len(nominal.contributors))
-    earlier = dict(zip(sources.tolist(), poses_of(entries), strict=True))
-    # The published step stretches parts slightly, but a joint keeps their shape: the nearest rigid pose about the centre.
-    for k, X in earlier.items() if not method.is_exact else ():
-        vertices, R = nominal.parts[k].vertices, nearest_rotation(X.R)
-        earlier[k] = Pose(R, X.t + (X.R - R) @ ca.DM((vertices.min(axis=0) + vertices.max(axis=0)) / 2))
+    # The published step stretches parts slightly, but a joint keeps their shape.
+    handed_over = poses_of(entries)
+    if not method.is_exact:
+        handed_over = [_rigid(X, nominal.parts[k].vertices) for X, k in zip(handed_over, sources.tolist(), strict=True)]
+    earlier = dict(zip(sources.tolist(), handed_over, strict=True))
     placed = placed_poses(nominal, station, deviations, earlier)
     first = next(index for index, part in enumerate(nominal.parts) if part.station == station)
     relative = [

@@ -100,10 +100,12 @@ class AcceptanceLimits:
         return found
 
     def _is_turned(self, task: Task, state: State) -> Bool[Array, " n"]:
+        """Return whether a part rotated too far from its raw pose (n,)."""
         difference = state.poses[:, self._movers, :9] - task.raw[:, self._movers, :9]
         return ((difference**2).sum(axis=2) > self._max_turn).any(axis=1)
 
     def _is_far(self, task: Task, state: State) -> Bool[Array, " n"]:
+        """Return whether a contact point may be too far from its raw place (n,)."""
         return self.displacement(task.raw, state.poses) > MAX_TRAVEL_SIZES * self._size
 
     def allowed(self, k: int) -> float:

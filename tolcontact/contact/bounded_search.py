@@ -1,29 +1,24 @@
-"""The search of bounded faces: the places where two bodies can touch are found at every pose.
-
-Guards detect bodies that interfere where the list of places shows nothing.
-"""
+"""The search of bounded faces: the places where two bodies can touch are found at every pose."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import Program
+from tolcontact.contact.bounded_scan import BoundedScan, SearchedPlaces
 from tolcontact.contact.fixed_search import Carriers, FixedSearch, Search
+from tolcontact.contact.guard import GUARD, PARTING, Guard, is_guard, no_places
 from tolcontact.contact.scan import PENETRATION, Scan
-from tolcontact.contact.searched_scan import BoundedScan, SearchedPlaces
 from tolcontact.contact.slots import Slots
 from tolcontact.discretization import FIRST_POINT, raised_places
 from tolcontact.geometry.kernel import INSIDE
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting, parting
-from tolcontact.geometry.places import Look, Places, RaisedPlaces, unraised
-from tolcontact.interference import Neighbours, WayOut, ordered
+from tolcontact.geometry.places import Look, RaisedPlaces, unraised
 
 EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
 
@@ -32,10 +27,6 @@ EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond
 FREE_SHARE = 1e-2
 ALIGNED = 0.87  # cosine of the largest angle between the axis of separation and the normal of a penetrating place that counts
 SHOWN_SHARE = 0.05  # of the gap along this axis: no place is added if another place shows the gap to within this share
-GUARD = 1 << 41  # first label of places that a guard adds: a label encodes the direction that separates the bodies
-PARTING = 2 * GUARD  # first label of places along which convex bodies part best (see Parting)
-LEVELS = 1 << 12  # of a component of that direction
-APART = 2.0 * 8.0 ** np.arange(3)  # insets of both bodies: the distances at which a place that holds them apart is searched
 
 
 class BoundedSearch(FixedSearch):
@@ -96,7 +87,7 @@ class BoundedSearch(FixedSearch):
         return BoundedScan(meeting, SearchedPlaces.of(raised))
 
     @cached_property
-    def guard(self) -> "Guard | None":
+    def guard(self) -> Guard | None:
         """What detects bodies that interfere where no place shows it; None if they may interfere."""
         return Guard.of(self.program, self.index)
 
@@ -134,17 +125,16 @@ def _kept(labels: np.ndarray, former: Scan | None, at_rest: np.ndarray | None) -
     return np.concatenate([kept, former.minima], axis=1) if isinstance(former, BoundedScan) else kept
 
 
-def _with_guard(raised: RaisedPlaces, guard: "Guard", X_RM: np.ndarray, former_labels: np.ndarray | None) -> RaisedPlaces:
+def _with_guard(raised: RaisedPlaces, guard: Guard, X_RM: np.ndarray, former_labels: np.ndarray | None) -> RaisedPlaces:
     """Return places with one more where bodies interfere and no place shows it.
 
     If such a place was active before (`former_labels` (n, k)), it is found again: else bodies would interfere again at once.
     """
     labels = np.full(len(X_RM), -1)
     if former_labels is not None:
-        is_guard = (former_labels >= GUARD) & (former_labels < PARTING)
-        labels = np.where(is_guard, former_labels, -1).max(axis=1, initial=-1)
+        labels = np.where(is_guard(former_labels), former_labels, -1).max(axis=1, initial=-1)
     rows = np.flatnonzero((labels >= 0) | (raised.gaps.min(axis=1, initial=np.inf) >= -PENETRATION))
-    extra = _no_places(len(X_RM))
+    extra = no_places(len(X_RM))
     for values, of_rows in zip(extra, guard.places(X_RM[rows], labels[rows]), strict=True):
         values[rows] = of_rows
     return raised.followed_by(unraised(extra))
@@ -169,83 +159,3 @@ def _with_parting(raised: RaisedPlaces, parting: Parting, X_RM: np.ndarray, form
         crossings = parting.crossings(X_RM, edges, axis.n_r[:, 0])
         added.append(crossings._replace(labels=np.where(np.isfinite(crossings.gaps), former_labels, -1)))
     return raised.followed_by(*map(unraised, added))
-
-
-def _label(normals: Float[Array, "n 3"]) -> Int[Array, " n"]:
-    digits = np.round((normals + 1) / 2 * (LEVELS - 1)).astype(np.int64)
-    return GUARD + (digits[:, 0] * LEVELS + digits[:, 1]) * LEVELS + digits[:, 2]
-
-
-def _direction(labels: Int[Array, " n"]) -> Float[Array, "n 3"]:
-    code = labels - GUARD
-    digits = np.stack([code // LEVELS**2, code // LEVELS % LEVELS, code % LEVELS], axis=1)
-    normals = digits / (LEVELS - 1) * 2 - 1
-    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
-
-
-def _no_places(count: int) -> Places:
-    """Return empty places (n, 1)."""
-    return Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
-
-
-@dataclass(frozen=True, eq=False)
-class Guard:
-    """The bodies of a pair as the search moves them: as a whole, with the face that touches.
-
-    is_swapped   whether the moving body is the second one of the neighbours
-    """
-
-    neighbours: Neighbours
-    is_swapped: bool
-
-    @classmethod
-    def of(cls, program: Program, index: int) -> "Guard | None":
-        """Return the guard of a pair; None if its bodies may interfere, have no inside, or grow where they touch."""
-        pair = program.nominal.pairs[index]
-        assert pair.reference is not None
-        if any(face is not None and face.grows for face in pair.deviating):
-            return None
-        bodies = ordered(pair.moving, pair.reference)
-        neighbours = program.watch.neighbours(bodies)
-        return None if neighbours is None else cls(neighbours, pair.moving != bodies[0])
-
-    def interferes(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
-        """Return whether the bodies interfere at X_RM (n,)."""
-        return self.neighbours.interfere(pose.inverse(X_RM) if self.is_swapped else X_RM)
-
-    def places(self, X_RM: Float[Array, "n 12"], labels: Int[Array, " n"]) -> Places:
-        """Return a place (n, 1) that separates the bodies at X_RM where they interfere, or touch; an infinite gap for none.
-
-        labels   (n,) of the places that held the bodies apart before, -1 for none: these bodies touch, or are a little apart
-        """
-        found = _no_places(len(X_RM))
-        self._part(found, np.arange(len(X_RM)), X_RM, np.zeros((len(X_RM), 3)))
-        for apart in APART * sum(self.neighbours.insets):
-            rows = np.flatnonzero((found.labels[:, 0] < 0) & (labels >= 0))
-            if rows.size:
-                self._part(found, rows, X_RM, -apart * _direction(labels[rows]))
-        return found
-
-    def _part(self, found: Places, rows: Int[Array, " k"], X_RM: Float[Array, "n 12"], shift: Float[Array, "k 3"]) -> None:
-        """Write the place that separates bodies in some rows, which overlap once the moving one is shifted."""
-        shifted = X_RM[rows]
-        shifted[:, 9:] += shift
-        way = self.ways_out(shifted, -shift)
-        is_known = way.widths > 0
-        rows, way = rows[is_known], WayOut(*(values[is_known] for values in way))
-        arms = np.einsum("nij,nj->ni", pose.rotation(X_RM[rows]), way.places) + pose.translation(X_RM[rows]) - way.feet
-        gaps = (arms * way.normals).sum(axis=1)
-        for values, of_rows in zip(found, (_label(way.normals), gaps, way.places, way.feet, way.normals), strict=True):
-            values[rows, 0] = of_rows
-
-    def ways_out(self, X_RM: Float[Array, "n 12"], directions: Float[Array, "n 3"] | None = None) -> WayOut:
-        """Return how the bodies separate: P_m, P_r and n_r of the paper, and how deep the place P_m lies (n,) [mm].
-
-        directions   (n, 3) of separation, if known (see Neighbours)
-        """
-        if not self.is_swapped:
-            return self.neighbours.ways_out(X_RM, directions)
-        R = pose.rotation(X_RM)
-        given = None if directions is None else -np.einsum("nji,nj->ni", R, directions)
-        way = self.neighbours.ways_out(pose.inverse(X_RM), given)
-        return WayOut(way.feet, way.places, -np.einsum("nij,nj->ni", R, way.normals), way.widths)

@@ -7,10 +7,12 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.bounded_search import FREE_SHARE, BoundedSearch, Guard
-from tolcontact.contact.fixed_search import MIN_BULGE, Carriers, FixedSearch, Search, StandingSearch
+from tolcontact.contact.bounded_search import FREE_SHARE, BoundedSearch
+from tolcontact.contact.fixed_search import MIN_BULGE, Carriers, FixedSearch, Search
+from tolcontact.contact.guard import Guard
 from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
+from tolcontact.contact.standing_search import StandingSearch
 from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task
 from tolcontact.geometry.kernel import TINY

@@ -1,11 +1,11 @@
-"""The search of fixed contact points, and of points that follow from every pose, so that nothing is searched.
+"""The search of fixed contact points: all of them, the points that may be active, and their positions at other poses.
 
-The search of bounded faces derives from it, too (see bounded_search).
+Other searches derive from it (see standing_search, bounded_search).
 """
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -14,18 +14,16 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.contact import kernel
+from tolcontact.contact.raised_scan import RaisedScan, raised_scan
 from tolcontact.contact.scan import FixedScan, Scan, pair_scan, project
-from tolcontact.contact.searched_scan import RaisedScan, raised_scan
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.starts import FIRST, Start
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
-from tolcontact.mechanics import MOMENTS
 
 MAX_CLUSTERS = 6
 FORM_CLUSTERS = 8  # of faces with form, which touch at more places
 BULGE_SHARE = 1 / 2500  # of the smallest tolerance range: accepted penetration of planes with form between contact points
 MIN_BULGE = 1e-7  # mm
-STEP = 1e-6  # mm, for finite differences of gaps of points that follow from every pose
 
 
 class Search(NamedTuple):
@@ -175,51 +173,3 @@ class FixedSearch:
         is_point, minima = labels < FIRST_PLACE, self.pair.minima
         places = self.fixed.pair.P_m[np.where(is_point, labels, 0)]
         return places if minima is None else np.where(is_point[:, None], places, minima.points(labels))
-
-
-class StandingSearch(FixedSearch, Scan):
-    """The points of a pair whose gaps are a function of the pose. It is its own scan, at any pose."""
-
-    pair: Any  # a kind of contact that states `touching` and `ends`, see discretization/round_contact
-
-    def __init__(self, program: Program, index: int, tables: Sequence[np.ndarray] = ()) -> None:
-        super().__init__(program, index, tables)
-        self._at = program.gaps[index]
-
-    def gaps(self, X_RM: np.ndarray, deviations: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
-        gaps = self._at(X_RM=X_RM, deviations=deviations)["gaps"]
-        return np.asarray(gaps if points is None else gaps[:, points])
-
-    def touching_counts(self, X_RM: np.ndarray, deviations: np.ndarray, limit: float) -> np.ndarray:
-        return np.asarray((self._at(X_RM=X_RM, deviations=deviations)["distances"] < limit).sum(axis=0))
-
-    def touching(self, X_RM: np.ndarray, deviations: np.ndarray, nearness: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points that touch; normals are the derivatives of gaps by translation."""
-        shifts = STEP * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
-        X = np.repeat(X_RM, len(shifts), axis=0)
-        X[:, -3:] += shifts
-        distances = self._at(X_RM=X, deviations=np.repeat(deviations, len(shifts), axis=0))["distances"]
-        is_near = distances[0] < nearness
-        normals = ((distances[1:4] - distances[4:]) / (2 * STEP)).T[is_near]
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
-        return self.pair.touching(X_RM[0], is_near, normals), normals
-
-    def scan(self, X_RM: np.ndarray, deviations: np.ndarray, search: Search, former: Scan | None, slots: Slots | None) -> Scan:
-        return self
-
-    def raw_active(self, X_RM: np.ndarray, deviations: np.ndarray, activity: float) -> None:
-        return None
-
-    def carriers(self, loaded: np.ndarray, points: np.ndarray | Slots) -> Carriers:
-        places, on_moving, may_not_overhang, overhang = self.pair.ends()
-        realization, column = np.nonzero(loaded & may_not_overhang)
-        return Carriers(realization, places[column], on_moving[column], overhang)
-
-    def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        return np.asarray(self.gaps(relative, deviations).min(axis=1))
-
-    def survey(self, X_RM: np.ndarray, deviations: np.ndarray, activity: float) -> tuple[np.ndarray, np.ndarray]:
-        active = self.gaps(X_RM, deviations) < activity
-        sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self._tables]
-        moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
-        return active.sum(axis=1), moments

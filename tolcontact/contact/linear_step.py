@@ -7,6 +7,7 @@ a strictly convex problem, so the rounds end with the solution of the QP that ha
 
 import copy
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,13 @@ from tolcontact.mechanics import ENTRIES
 
 MAX_ROUNDS = 60
 MAX_RESIDUAL = 1e-3  # of the group's length: a larger KKT residual [mm] is no answer
+
+
+class Step(NamedTuple):
+    """How large a step was, (n,) [mm]: its largest increment, and the same in the norm of the objective."""
+
+    size: Float[Array, " n"]
+    scaled: Float[Array, " n"]
 
 
 class LinearStep:
@@ -63,10 +71,8 @@ class LinearStep:
         caution: Float[Array, " n"] | float = 0.0,
         firmness: float = 1.0,
         newton: bool = False,
-    ) -> Float[Array, "2 n"]:
+    ) -> Step:
         """Take one linear step, the solution of the QP with a row for every point; write it into `state`.
-
-        Returns how large it was (2, n) [mm]: its largest increment, and the same in the norm of the objective.
 
         stride     the largest rotation of a part [rad] in the step
         caution    (n,): makes steps smaller, but does not change where they end
@@ -105,7 +111,7 @@ class LinearStep:
             if part[1] is not state:
                 state.put(rows, part[1])
         state.iterations[:] += 1
-        return size
+        return Step(*size)
 
     def _inputs(self, task: Task, state: State, slots: Sequence[Slots], newton: bool) -> dict[str, np.ndarray]:
         """Return the inputs that the QPs of all rounds share: the poses and reactions before the step, and its slots."""

@@ -4,20 +4,20 @@ The first steps are like the paper's. Realizations that still move then have fre
 curvature of gaps and objective counts: they continue with Newton steps, which hold those freedoms firmly at first.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import LOST_SIZES, AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.fixed_search import Search
 from tolcontact.contact.free_steps import FreeSteps
-from tolcontact.contact.linear_step import LinearStep
-from tolcontact.contact.scan import PENETRATION, min_gaps, undone
-from tolcontact.contact.slots import Slots
+from tolcontact.contact.linear_step import LinearStep, Step
+from tolcontact.contact.progress import Progress
+from tolcontact.contact.scan import PENETRATION, min_gaps
 from tolcontact.contact.starts import Start
 from tolcontact.contact.state import State, Task, Unsettled
 
@@ -27,15 +27,6 @@ NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beyond sha
 MAX_IDLE = 3  # steps in a row that end where they begin, because bodies would penetrate: the next ones hardly ever differ
 OUTLOOK = 4.0  # steps: places with larger gaps are not looked for, since the next step is hardly ever larger than the last
 CLOSED = 1e-6  # mm, and of rotation matrices: steps that return this close to an earlier pose repeat themselves
-ASTRAY_WEIGHT = 1e3  # of a locator that does not hold, relative to penetration
-PATIENCE_IN_CONFLICT, MIN_GAIN = 10, 1e-3  # steps without less penetration, and the share of it that counts as less
-PATIENCE, MIN_CALMING = 20, 0.1  # steps that are not smaller than all before, and the share that counts as smaller
-# Of steps about points that are projected again:
-MAX_STEPS = 100
-GOOD_RATIO = 0.7  # a good step is at most this part of the step before, or gains at least this part of the predicted gain
-CAUTION_FACTOR = 10.0  # growth of caution after a step that stalls, and its reduction after one that gains
-MIN_SCALED_STEP = 1e-6  # mm, in the norm of the objective: its square is what a step gains
-PROJECTED_TOLERANCE = 1e-8  # mm: a smaller step is the last one
 
 
 class Phase(NamedTuple):
@@ -80,57 +71,6 @@ def _schedule(candidates: Candidates, start: Start) -> Sequence[Phase]:
     if start.sloped:
         return FROM_ANSWERS
     return WHERE_FACES_END if candidates.bounded else WITH_FORM if candidates.change else USUAL
-
-
-@dataclass(eq=False)
-class Progress:
-    """The best state reached, and the number of full steps without improvement.
-
-    best       State (n) of smallest true penetration; its `slack` is the penetration of each pair
-    violation  (n,) [mm] of these poses
-    stale      (n,) number of steps since the violation fell
-    unrest     (n,) [mm]: the smallest step
-    restless   (n,) number of steps since then
-    """
-
-    best: State
-    violation: Float[Array, " n"]
-    stale: Int[Array, " n"]
-    unrest: Float[Array, " n"]
-    restless: Int[Array, " n"]
-
-    @classmethod
-    def start(cls, state: State) -> "Progress":
-        """Return the progress before the first look."""
-        count = len(state)
-        violation, unrest = np.full((2, count), np.inf)
-        stale, restless = np.zeros((2, count), dtype=int)
-        return cls(state.take(np.arange(count)), violation, stale, unrest, restless)
-
-    def is_over(self, in_conflict: Bool[Array, " n"]) -> Bool[Array, " n"]:
-        """Return whether further steps are not expected to gain (n,): drift, cycles and chaos gain nothing at all."""
-        return np.where(in_conflict, self.stale >= PATIENCE_IN_CONFLICT, self.restless >= PATIENCE)
-
-    def look(self, state: State, penetration: Float[Array, "n pair"], unrest: Float[Array, " n"], *, is_held: bool) -> None:
-        """Keep the poses of a state (n), with their true penetration [mm], where they are better than all before.
-
-        unrest    (n,) [mm]: the size of the step
-        is_held   whether the step was held back
-        """
-        violation = penetration.max(axis=1, initial=0) + ASTRAY_WEIGHT * state.astray
-        falls, calms = violation < (1 - MIN_GAIN) * self.violation, unrest < (1 - MIN_CALMING) * self.unrest
-        self.stale = np.where(falls | is_held, 0, self.stale + 1)
-        self.restless = np.where(calms | is_held, 0, self.restless + 1)
-        better = np.flatnonzero(violation < self.violation)
-        candidate = state.take(better)
-        candidate.slack[:] = penetration[better]
-        self.best.put(better, candidate)
-        self.violation[better] = violation[better]
-        self.unrest = np.minimum(self.unrest, unrest)
-
-    def take(self, rows: np.ndarray) -> "Progress":
-        """Return the progress of some realizations."""
-        return Progress(self.best.take(rows), self.violation[rows], self.stale[rows], self.unrest[rows], self.restless[rows])
 
 
 def repeat(
@@ -214,15 +154,15 @@ def _end(unsettled: Unsettled, progress: Progress | None, unrest: Float[Array, "
     unsettled.settle(ends)
 
 
-def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, phase: Phase, stride: float) -> np.ndarray:
+def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, phase: Phase, stride: float) -> Step:
     """Take a step of some realizations; the others stay where they are."""
     if len(rows) == len(unsettled):
         return step.take(unsettled.task, unsettled.state, stride=stride, firmness=phase.firmness, newton=phase.newton)
     task, state = unsettled.task.take(rows), unsettled.state.take(rows)
-    sizes = np.zeros((2, len(unsettled)))
-    sizes[:, rows] = step.take(task, state, stride=stride, firmness=phase.firmness, newton=phase.newton)
+    size, scaled = np.zeros((2, len(unsettled)))
+    size[rows], scaled[rows] = step.take(task, state, stride=stride, firmness=phase.firmness, newton=phase.newton)
     unsettled.state.put(rows, state)
-    return sizes
+    return Step(size, scaled)
 
 
 def _goes_round(trail: Sequence[np.ndarray], state: State) -> Bool[Array, " n"]:
@@ -242,50 +182,3 @@ def _penetration(step: LinearStep, unsettled: Unsettled) -> Float[Array, "n pair
     """Return the penetration of each pair at the poses reached (n, pair) [mm]."""
     task, state = unsettled.task, unsettled.state
     return state.slack if step.bends else np.maximum(-min_gaps(task.scans, state.relative, task.deviations), 0)
-
-
-def repeat_projected(
-    step: LinearStep,
-    limits: AcceptanceLimits,
-    candidates: Candidates,
-    energy_of: Callable[[Task, State], np.ndarray],
-    task: Task,
-    state: State,
-    start: Start,
-    caution: float,
-) -> None:
-    """Take the steps of `state` to their end, each about points that were projected again onto curved faces.
-
-    More than one step about the same points would let a round part roll on the planes that represent its counterpart. Linear
-    rows neglect the curvature of the surfaces: steps that neither shrink nor gain are repeated with more caution, a weight on
-    the step itself, which is `caution` at first. `energy_of` returns the objective (n,).
-    """
-    unsettled, cautions = Unsettled(task, state), np.full(len(task), caution)
-    last_size, last_energy = np.full(len(task), np.inf), energy_of(task, state)
-    for _ in range(MAX_STEPS):
-        task, state = unsettled.task, unsettled.state
-        for slots in state.slots:  # the points that were active before may now be beyond the rim
-            slots.put(np.arange(len(state)), Slots.empty(*slots.points.shape))
-        size, scaled = step.take(task, state, stride=start.stride, caution=cautions)
-        energy = energy_of(task, state)
-        gain_ratio = (last_energy - energy) / np.maximum(scaled**2 / 2, 1e-300)  # relative to the gain that the QP predicts
-        scans = candidates.scans(state.relative, task.deviations, Search(start))
-        gaps = min_gaps(scans, state.relative, task.deviations)
-        depth = undone(scans, gaps, state.relative, task.deviations, task.may_carry, state.slack).max(axis=1)
-        # A step whose points are deeper inside afterwards only gains what is lost again later.
-        sinks = depth > np.maximum((1 - GOOD_RATIO) * np.minimum(size, scaled), PROJECTED_TOLERANCE)
-        stalls = (size > GOOD_RATIO * last_size) & (gain_ratio < 1 - GOOD_RATIO) | sinks
-        relaxed = np.where(gain_ratio > GOOD_RATIO, cautions / CAUTION_FACTOR, cautions)
-        cautions = np.where(stalls, np.maximum(CAUTION_FACTOR * cautions, 1), relaxed)
-        moves = (size > PROJECTED_TOLERANCE) & ~(stalls & (scaled < MIN_SCALED_STEP))
-        lost = moves & limits.have_drifted(task, state, LOST_SIZES)
-        state.kkt_residual[lost] = np.inf
-        moves &= ~lost
-        unsettled.settle(~moves)
-        cautions, last_size, last_energy = cautions[moves], size[moves], energy[moves]
-        if not len(unsettled):
-            return
-        unsettled.task = replace(unsettled.task, scans=[scan.take(np.flatnonzero(moves)) for scan in scans])
-    residual = unsettled.state.kkt_residual
-    residual[:] = np.maximum(residual, last_size)
-    unsettled.settle(np.ones(len(unsettled), dtype=bool))

@@ -1,7 +1,7 @@
 """Resolve contact: move a group of parts from raw poses to poses without penetration, and rate the certainty of the answer.
 
 The linearized resolution takes one linear step. The exact one repeats them (see repeated_steps), from some starts about
-contact points that are projected again. Realizations that end in a conflict, without an answer, or
+contact points that are projected again (see iterated_search). Realizations that end in a conflict, without an answer, or
 far from the raw pose are tried again from other starts (see starts).
 """
 
@@ -17,9 +17,10 @@ from tolcontact.contact.acceptance import ADRIFT_SIZES, MAX_TURN, AcceptanceLimi
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.fixed_search import Search
 from tolcontact.contact.free_steps import FreeSteps
+from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import MAX_ROUNDS, LinearStep
 from tolcontact.contact.record import accumulate_starts
-from tolcontact.contact.repeated_steps import repeat, repeat_projected
+from tolcontact.contact.repeated_steps import repeat
 from tolcontact.contact.scan import PENETRATION, min_gaps, undone
 from tolcontact.contact.starts import FIRST, RESCUES, Start
 from tolcontact.contact.state import Outcome, Resolved, State, Task
@@ -133,7 +134,7 @@ class ContactResolver:
         """Take steps from the poses of `state` to an answer, and judge it."""
         if start.projected:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull parts far if nothing holds them
-            repeat_projected(self._step, self._limits, self._candidates, self._energy_of, task, state, start, caution)
+            search(self._step, self._limits, self._candidates, self._energy_of, task, state, start, caution)
         elif self._method.is_exact:
             repeat(self._step, self._limits, self._candidates, self._free_steps, task, state, start)
         else:
@@ -173,6 +174,7 @@ class ContactResolver:
             gaps = self._candidates.pairs[k].gaps(state.relative[:, k], task.deviations)
             reactions = state.multipliers[:, span]
             if flexibility is None or openings is None:
+                assert pair.stiffness is not None
                 compression = reactions / pair.stiffness
                 misfits = np.minimum(gaps + compression, compression)
             else:

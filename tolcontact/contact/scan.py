@@ -84,26 +84,28 @@ class FixedScan(Scan):
     points     as compiled passes take them
     clusters   (cluster + 1,): the first branch of each cluster, and the end
     tables     moment tables (moment, point) of the sides that enter the objective
-    raised     the heights of the points, if they are known; otherwise they follow from the deviations
     """
 
     pair: ContactPoints
     points: kernel.Points
     clusters: Int[Array, " _"]
     tables: tuple[Float[Array, "moment point"], ...]
-    raised: kernel.Raised = NOT_RAISED
 
     def gaps(
         self,
         relative: Float[Array, "realization 12"],
         deviations: Float[Array, "realization contributor"],
         limits: Float[Array, " realization"] | None = None,
+        *,
+        raised: kernel.Raised | None = None,
     ) -> Float[Array, "realization point"]:
-        """Return gaps (realization, point) [mm]; infinite ones of leaves where all are above `limits` (realization,) [mm]."""
+        """Return gaps (realization, point) [mm]; infinite ones of leaves where all are above `limits` (realization,) [mm].
+
+        raised   the heights of the points, if they are known; otherwise they follow from the deviations
+        """
         gaps = np.empty((len(relative), len(self.pair.P_m)))
         limits = np.full(len(relative), np.inf) if limits is None else limits
-        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-        kernel.write_gaps(self.points, self.raised, poses, heights, limits, gaps)
+        kernel.write_gaps(*self._inputs(relative, deviations, raised), limits, gaps)
         return gaps
 
     def survey(
@@ -137,25 +139,38 @@ class FixedScan(Scan):
         deviations: Float[Array, "realization contributor"],
         may_carry: Bool[Array, "realization point"] | None = None,
         limit: float = np.inf,
+        *,
+        raised: kernel.Raised | None = None,
     ) -> tuple[Int[Array, "realization cluster"], Float[Array, "realization cluster"]]:
         """Return index and gap [mm] of the deepest point of each cluster, if its gap is less than `limit` [mm].
 
-        Otherwise these are the first point of the cluster, and `limit`. `clusters` are as those of the scan.
+        Otherwise these are the first point of the cluster, and `limit`.
+
+        clusters   (cluster + 1,): the first branch of each cluster, and the end
+        raised     the heights of the points, if they are known; otherwise they follow from the deviations
         """
         points = np.empty((len(relative), len(clusters) - 1), dtype=np.int64)
         gaps = np.empty(points.shape)
         mask = np.empty((len(relative), 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
-        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-        kernel.deepest(self.points, self.raised, poses, heights, clusters, mask, limit, points, gaps)
+        kernel.deepest(*self._inputs(relative, deviations, raised), clusters, mask, limit, points, gaps)
         return points, gaps
 
+    def _inputs(
+        self, relative: np.ndarray, deviations: np.ndarray, raised: kernel.Raised | None
+    ) -> tuple[kernel.Points, kernel.Raised, np.ndarray, np.ndarray]:
+        """Return the first arguments of compiled passes."""
+        points = self.points if raised is None else self._nominal_points
+        return points, raised or NOT_RAISED, np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+
     @cached_property
-    def nominal_points(self) -> kernel.Points:
+    def _nominal_points(self) -> kernel.Points:
         """The points without the heights that deviations add."""
         points, size = self.points, self.points.basis.shape[1]
-        boxes = (np.ascontiguousarray(boxes[:, : size - 1]) for boxes in (points.leaf_boxes, points.branch_boxes))
-        return kernel.Points(
-            points.basis, points.columns[:0], points.coordinates[:size], points.leaves, points.branches, *boxes
+        leaf_boxes, branch_boxes = (
+            np.ascontiguousarray(boxes[:, : size - 1]) for boxes in (points.leaf_boxes, points.branch_boxes)
+        )
+        return points._replace(
+            columns=points.columns[:0], coordinates=points.coordinates[:size], leaf_boxes=leaf_boxes, branch_boxes=branch_boxes
         )
 
     @cached_property
@@ -234,9 +249,11 @@ def project(scan: FixedScan, relative: Float[Array, "realization 12"], margin: f
 def pair_scan(
     pair: ContactPoints, gaps: GapMap, tables: Sequence[np.ndarray], clusters: int, points: np.ndarray | None = None
 ) -> FixedScan:
-    """Sort some points (point,) of a pair, or all, into at most `clusters` clusters of neighbours, branches and leaves.
+    """Sort the points of a pair into at most `clusters` clusters of neighbours, and each cluster into branches and leaves.
 
     Each support has its own cluster.
+
+    points   indices (point,) of the points of the scan; all if it is None
     """
     points = np.arange(len(pair.P_m)) if points is None else points
     label = cluster_labels(pair.P_m[points], len(points) if pair.is_supports else clusters)
@@ -302,7 +319,8 @@ def undone(
 ) -> Float[Array, "realization pair"]:
     """Return the penetration beyond the slack of points that may be active (realization, pair) [mm].
 
-    The smallest gaps `min_gap` are of all points; `may_carry` has for each pair (realization, point), or None if all may.
+    min_gap     (realization, pair) [mm]: the smallest gaps of all points
+    may_carry   for each pair (realization, point), or None if all points may
     """
     depths = [
         -min_gap[:, k] if may is None else scan.deepest(relative[:, k], deviations, may).depth.max(axis=1)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.contact import kernel
+from tolcontact.contact import slots_kernel
 
 MAX_CARRYING = 8  # points that keep their slots from one round to the next
 NEGLIGIBLE_SHARE = 1e-9  # of the largest multiplier of a pair: smaller ones are rounding
@@ -49,7 +49,7 @@ class Slots:
     def carrying(self, multipliers: Float[Array, "n slot"]) -> "Slots":
         """Return only the slots of active rows, at most MAX_CARRYING, the largest multipliers (n, slot) first."""
         kept = np.empty_like(self.points), np.empty_like(self.filled), np.empty_like(self.reactions)
-        kernel.keep(self.points, self.filled, multipliers, NEGLIGIBLE_SHARE, MAX_CARRYING, kept)
+        slots_kernel.keep(self.points, self.filled, multipliers, NEGLIGIBLE_SHARE, MAX_CARRYING, kept)
         return Slots(*kept)
 
     def with_deepest(
@@ -62,5 +62,5 @@ class Slots:
         """
         extended = np.empty_like(self.points), np.empty_like(self.filled), np.empty_like(self.reactions)
         grows = np.empty(len(points), dtype=bool)
-        kernel.extend(self.points, self.filled, self.reactions, points, depth, tolerance, fills, (*extended, grows))
+        slots_kernel.extend(self.points, self.filled, self.reactions, points, depth, tolerance, fills, (*extended, grows))
         return Slots(*extended), grows

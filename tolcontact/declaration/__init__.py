@@ -11,7 +11,6 @@ from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.geometry import UNITS, Box, Elastic, Geometry, Mesh, Pin
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure, stations
-from tolcontact.declaration.measured_table import Population
 from tolcontact.declaration.measurement import (
     Angle,
     AxisDistance,
@@ -29,12 +28,14 @@ from tolcontact.declaration.measurement import (
     Minimum,
     Sum,
 )
-from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
+from tolcontact.declaration.part import DatumTargets, Face, Feature, Part, Pattern, Point
+from tolcontact.declaration.population import Population
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Form, Size
 from tolcontact.declaration.stack import Stack
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
+from tolcontact.declaration.toleranced import OUTSIDE
 from tolcontact.declaration.values import degrees
 
 __all__ = [

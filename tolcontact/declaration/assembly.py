@@ -6,7 +6,6 @@ from typing import Any, ClassVar, Generic, TypeVar, get_args, overload
 
 from tolcontact.declaration.checks import FRICTION, Checked, one_of
 from tolcontact.declaration.contact_pair import ContactPair, Force, Joint, Overlap
-from tolcontact.declaration.copies import Plane, mirrored, widened
 from tolcontact.declaration.declarations import (
     Declarations,
     Station,
@@ -20,13 +19,16 @@ from tolcontact.declaration.dependence import Correlation, CorrelationKind, Vari
 from tolcontact.declaration.geometry import UNITS, Geometry, Unit
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.measured_table import Gaps, Population, population
-from tolcontact.declaration.model_faults import MAX_COUNTS, declaration_faults, omissions, setting_faults
+from tolcontact.declaration.measured_table import Gaps, population
+from tolcontact.declaration.mirroring import Plane, mirrored
+from tolcontact.declaration.model_faults import declaration_faults, omissions, setting_faults
 from tolcontact.declaration.part import Feature, Part, Standard
+from tolcontact.declaration.population import Population
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import Mirror, Vector, is_length, script_line, text_faults, vector as _vector
+from tolcontact.declaration.widening import widened
 from tolcontact.declaration.written_tolerance import TextFault, written
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
@@ -35,6 +37,10 @@ from tolcontact.user_functions import refuse_in_functions
 T = TypeVar("T")
 
 CONSTANT_SHARE = 1e-3  # of the widest zone: a narrower one counts as a constant
+MAX_COUNTS = {  # of what an assembly declares
+    "parts": 1000, "locations": 1000, "pairs": 5000, "measures": 2000, "forces": 5000, "variables": 5000, "correlations": 5000,
+    "populations": 1000, "stations": 60, "joints": 1000, "overlaps": 1000,
+}  # fmt: skip
 
 
 class Declared(Generic[T]):
@@ -318,6 +324,9 @@ class Assembly(Declarations, Pictured, Checked):
         yield from omissions(self)
         yield from (*text_faults("assembly", [self.name]), *super().faults())
         yield from setting_faults(self)
+        for name, most in MAX_COUNTS.items():
+            if (count := len(self._declared[name])) > most:
+                yield f"it has {count} {name}; expected at most {most}"
         yield from declaration_faults(self)
 
     def __str__(self) -> str:

@@ -9,7 +9,7 @@ import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
 from tolcontact.declaration import entries
-from tolcontact.declaration.assembly import Assembly
+from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
 from tolcontact.declaration.checks import NOT_NEGATIVE, POSITIVE, text_type
 from tolcontact.declaration.codec import (
     CODECS,
@@ -29,9 +29,8 @@ from tolcontact.declaration.dependence import Correlation, Variable
 from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure, Tape, tape_of
-from tolcontact.declaration.measured_table import Population
-from tolcontact.declaration.model_faults import MAX_COUNTS
 from tolcontact.declaration.part import Face, Feature, Part, Standard
+from tolcontact.declaration.population import Population
 from tolcontact.declaration.record import Field, Record
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
@@ -190,9 +189,9 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
         of_part = replace(place["parts"][k]["features"], part=part)
         for number, item in enumerate(of_part.converted(entry.get("features", []), list[Any])):
             part.add(entries.TOLERANCED.decode(item, of_part[number], part=part))
-        for name, record in (("datum_targets", entries.TARGETS), ("elastic", entries.ELASTIC)):
-            for declared in Items(record).decode(entry.get(name, []), place["parts"][k][name]):
-                part.add(declared)
+        for targets in Items(entries.TARGETS).decode(entry.get("datum_targets", []), place["parts"][k]["datum_targets"]):
+            part.add(targets)
+        part._declared.extend(Items(entries.ELASTIC).decode(entry.get("elastic", []), place["parts"][k]["elastic"]))
 
     things: dict[str, Any] = {"parts": parts}
     for name in [name for name in RECORDS if name not in ("parts", "measures")]:

@@ -187,6 +187,11 @@ class GeometricTolerance(Checked):
         return None if self.along is None else _direction(self.along)
 
     @property
+    def _unit_lengths(self) -> tuple[float, ...]:
+        """The lengths [mm] of the parts of a surface that it applies to; none for the surface as a whole."""
+        return () if self.per is None else _lengths(self.per)
+
+    @property
     def limits_form_alone(self) -> bool:
         """Whether it limits no displacement of a feature: a tolerance of form, or a profile without datums."""
         return self.is_form or not (self.of.needs_datums or self.datums)
@@ -247,7 +252,7 @@ class GeometricTolerance(Checked):
     def __str__(self) -> str:
         """Return the tolerance with the symbols of a drawing."""
         diameter, material = "⌀" if self.zone == "round" else "", f" {SYMBOLS[self.material]}" if self.material else ""
-        unit = "" if self.per is None else f"/{'×'.join(f'{length:g}' for length in _lengths(self.per))}"
+        unit = f"/{'×'.join(f'{length:g}' for length in self._unit_lengths)}" if self._unit_lengths else ""
         projected = "" if self.projected is None else f" Ⓟ{self.projected:g}"
         unequal = "" if self.outside is None else f" Ⓤ{self.outside:g}"
         tangent = " Ⓣ" if self.tangent else ""
@@ -259,7 +264,7 @@ class GeometricTolerance(Checked):
     def archived_text(self) -> str:
         """The tolerance without symbols, as archives describe the contributors of a feature."""
         round_ = "diameter " if self.zone == "round" else ""
-        unit = "" if self.per is None else f" per {' x '.join(f'{length:g}' for length in _lengths(self.per))} mm"
+        unit = f" per {' x '.join(f'{length:g}' for length in self._unit_lengths)} mm" if self._unit_lengths else ""
         tangent, datums = " of the tangent plane" if self.tangent else "", f" to {self.datums}" if self.datums else ""
         uneven = "" if self.outside is None else f", {self.outside:g} mm of it outside,"
         return f"{self.kind} {round_}{self.width:g}{self.material} mm{unit}{uneven}{tangent}{self._zones}{datums}"

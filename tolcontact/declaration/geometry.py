@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from tolcontact.declaration.checks import LENGTH, POSITIVE, TRUTH, Check, Checked, one_of
-from tolcontact.tables import fault_of
+from tolcontact.input_files import fault_of
 from tolcontact.texts import shown
 
 

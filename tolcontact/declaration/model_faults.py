@@ -10,10 +10,6 @@ from tolcontact.declaration.part import Part
 from tolcontact.declaration.values import group_faults, is_finite, key_faults, repetitions
 
 Line = Any  # an assembly; its module imports this one
-MAX_COUNTS = {  # of what an assembly declares
-    "parts": 1000, "locations": 1000, "pairs": 5000, "measures": 2000, "forces": 5000, "variables": 5000, "correlations": 5000,
-    "populations": 1000, "stations": 60, "joints": 1000, "overlaps": 1000,
-}  # fmt: skip
 KEYED = {"part": "parts", "contact pair": "pairs", "measurement": "measures", "force": "forces"}  # by names in the archive
 
 
@@ -28,7 +24,7 @@ def omissions(assembly: Line) -> Iterator[str]:
 
 
 def setting_faults(assembly: Line) -> Iterator[str]:
-    """Yield the faults of the title block and of gravity, and of lists that are too long."""
+    """Yield the faults of the title block and of gravity."""
     yield from (f"title block: {fault}" for fault in (assembly.title_block.faults() if assembly.title_block else ()))
     if assembly.acceleration is not None:
         if not (is_finite(assembly.acceleration) and any(assembly.acceleration)):
@@ -38,9 +34,6 @@ def setting_faults(assembly: Line) -> Iterator[str]:
         elif not any(part.elasticity for part in assembly.parts):
             advice = "declare the weights of rigid parts with assembly.force(...)"
             yield f"it has gravity, which acts on elastic parts alone; {advice}"
-    for name, most in MAX_COUNTS.items():
-        if (count := len(getattr(assembly, name))) > most:
-            yield f"it has {count} {name}; expected at most {most}"
 
 
 def declaration_faults(assembly: Line) -> Iterator[str]:

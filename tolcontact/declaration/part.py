@@ -1,24 +1,21 @@
 """Parts, their points and faces, their elasticity, and their toleranced geometry: features, patterns and datums."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain
 from pathlib import Path
 from typing import ClassVar, Literal, TypeVar, get_args
 
 from tolcontact.declaration.checks import Checked, Declaration, one_of
 from tolcontact.declaration.geometry import Elastic, Geometry, elastic_faults
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
-from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
+from tolcontact.declaration.toleranced import ASSOCIATIONS, Association, Control, Toleranced, letter_faults
 from tolcontact.declaration.values import Mirror, Side, Vector, is_finite, script_line, vector
 from tolcontact.readable import Readable
 from tolcontact.user_functions import refuse_in_functions
 
 D = TypeVar("D", bound=Checked)
 
-Association = Literal["outside", "least squares"]  # from a plane to a datum, ISO 5459
-OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = get_args(Association)
 Standard = Literal["", "ISO", "ASME"]
 
 
@@ -40,14 +37,14 @@ class Part(Declaration):
     standard: Standard = ""
     declared_at: str = field(default_factory=script_line)
     mirror: Mirror = ""
-    declared: "list[Feature | Pattern | DatumTargets | Elastic]" = field(default_factory=list, init=False)
+    _declared: "list[Feature | Pattern | DatumTargets | Elastic]" = field(default_factory=list, init=False)
     noun: ClassVar[str] = "part"
     checks: ClassVar = {"standard": one_of(get_args(Standard)), "mirror": one_of(get_args(Mirror))}
 
     @property
     def toleranced(self) -> "tuple[Feature | Pattern, ...]":
         """The features and patterns in the order of the script."""
-        return tuple(declared for declared in self.declared if isinstance(declared, Feature | Pattern))
+        return tuple(declared for declared in self._declared if isinstance(declared, Feature | Pattern))
 
     @property
     def features(self) -> "tuple[Feature, ...]":
@@ -56,12 +53,12 @@ class Part(Declaration):
 
     @property
     def targets(self) -> "tuple[DatumTargets, ...]":
-        return tuple(declared for declared in self.declared if isinstance(declared, DatumTargets))
+        return tuple(declared for declared in self._declared if isinstance(declared, DatumTargets))
 
     @property
     def elasticity(self) -> Elastic | None:
         """Its elasticity; None for a rigid part."""
-        return next((declared for declared in self.declared if isinstance(declared, Elastic)), None)
+        return next((declared for declared in self._declared if isinstance(declared, Elastic)), None)
 
     def feature(
         self, name: str, *constituents: "Face | Control", datum: str | None = None, association: Association = "outside"
@@ -107,19 +104,21 @@ class Part(Declaration):
         stiffness: str | Path | None = None, nodes: str | Path | None = None, pad: float | None = None,
         element_size: float | None = None,
     ) -> Elastic:  # fmt: skip
-        """Declare that forces bend this part: `part.elastic(E=70e3, nu=0.33)`, or by the files of a matrix.
+        """Declare that forces bend this part: `part.elastic(E=70e3, nu=0.33)`, or by the files of a matrix (see Elastic).
 
-        `E`, `nu`, `density`, `stiffness`, `nodes`, `pad` and `element_size` are explained by Elastic.
+        E, nu             modulus [MPa] and Poisson's ratio of its material
+        density           [kg/m^3], which `assembly.gravity` needs
+        stiffness, nodes  files of a stiffness matrix [N/mm] without supports, and of its nodes [mm], in place of E and nu
+        pad               [mm] radius over which a force at a point is spread
+        element_size      [mm] longest edge of its tetrahedra, smaller than by default if `tolcontact check` asks for it
         """
-        return self.add(Elastic(
-            E=E, nu=nu, density=density, stiffness=stiffness, nodes=nodes, pad=pad,
-            element_size=element_size, declared_at=script_line(),
-        ))  # fmt: skip
+        elastic = Elastic(E=E, nu=nu, density=density, stiffness=stiffness, nodes=nodes, pad=pad, element_size=element_size)
+        return self.add(replace(elastic, declared_at=script_line()))
 
     def add(self, declared: D) -> D:
         """Add a declaration of this part, and return it."""
         refuse_in_functions()
-        self.declared.append(declared)  # type: ignore[arg-type]
+        self._declared.append(declared)  # type: ignore[arg-type]
         return declared
 
     def datum_targets(self, letter: str, *points: "Point") -> "DatumTargets":
@@ -147,7 +146,7 @@ class Part(Declaration):
         for label, example in (("at", "(0, 0, 10)"), ("rotation", "tc.degrees(0, 0, 90)")):
             if not is_finite(getattr(self, label)):
                 yield f"{label} is {getattr(self, label)!r}; expected three finite numbers, as in {label}={example}"
-        yield from elastic_faults([declared for declared in self.declared if isinstance(declared, Elastic)], self.fixed)
+        yield from elastic_faults([declared for declared in self._declared if isinstance(declared, Elastic)], self.fixed)
 
     def __str__(self) -> str:
         place = "" if self.at == (0.0, 0.0, 0.0) else " at ({:g}, {:g}, {:g})".format(*self.at)
@@ -168,8 +167,8 @@ class Face(Readable):
         return (self.part, *(selection.part for selection in self.selections if isinstance(selection, Near)))
 
     def faults(self) -> Iterator[str]:
-        faults = (fault for selection in self.selections for fault in selection.faults())
-        yield from (f'face of part "{self.part.name}": {fault}' for fault in faults)
+        for selection in self.selections:
+            yield from (f'face of part "{self.part.name}": {fault}' for fault in selection.faults())
 
     def __str__(self) -> str:
         return " ".join([self.part.name, *map(str, self.selections)])
@@ -237,10 +236,11 @@ class Feature(Toleranced):
         return Point(self.part, None, self, end)
 
     def faults(self) -> Iterator[str]:
-        yield from chain(self.face_faults(), letter_faults(self.datum), super().faults())
+        yield from (*self.face_faults(), *letter_faults(self.datum), *super().faults())
         yield from self.tolerance_faults(len(self.faces))
 
     def face_faults(self) -> Iterator[str]:
+        """Yield the faults of the faces alone."""
         for face in self.faces:
             yield from face.faults()
             if face.part is not self.part:

@@ -22,8 +22,8 @@ from tolcontact.declaration.geometry import Mesh
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face
 from tolcontact.errors import ScriptError, TolcontactError, nearest_name
+from tolcontact.input_files import fault_of
 from tolcontact.replacing import replacing
-from tolcontact.tables import fault_of
 from tolcontact.texts import clipped
 
 UNEXPECTED = re.compile(r"([\w.]+)\(\) got an unexpected keyword argument '(\w+)'")  # a TypeError of Python

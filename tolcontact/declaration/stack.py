@@ -16,7 +16,8 @@ from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import is_length
 from tolcontact.declaration.written_tolerance import TextFault, written
 from tolcontact.errors import Faults, ModelError, nearest_name
-from tolcontact.tables import EMPTY, Table, check_inputs, number, read_table
+from tolcontact.input_files import check_inputs
+from tolcontact.tables import EMPTY, Table, number, read_table
 from tolcontact.texts import shown
 
 GAP = "gap "  # heading of a column with the sensitivities of a gap

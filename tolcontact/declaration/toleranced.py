@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, get_args
 
 from tolcontact.declaration.checks import Declaration
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Position
@@ -10,6 +10,9 @@ from tolcontact.declaration.size import Size
 from tolcontact.declaration.values import is_length
 
 Control = Size | GeometricTolerance  # what limits a feature
+Association = Literal["outside", "least squares"]  # from a plane to a datum, ISO 5459
+ASSOCIATIONS = get_args(Association)
+OUTSIDE = ASSOCIATIONS[0]
 LETTER = re.compile(r"[A-Z]{1,2}")
 
 

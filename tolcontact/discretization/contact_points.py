@@ -19,17 +19,10 @@ from tolcontact.discretization.scenes import Scene
 from tolcontact.elasticity import MAX_OFFSET, node_table
 from tolcontact.errors import GeometryFault
 from tolcontact.features import Features
+from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.overlap import overlap_corners, rim_points
-from tolcontact.geometry.spreading import (
-    CHORD_SHARE,
-    curvature_points,
-    distinct,
-    facet_error,
-    sampling_error,
-    spread,
-    unique_points,
-)
+from tolcontact.geometry.spreading import spread, unique_points
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import ROUNDING
 from tolcontact.geometry.triangle_mesh import coordinate_error

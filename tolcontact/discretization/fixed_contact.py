@@ -1,6 +1,6 @@
 """Contact points of a pair that are fixed for all realizations: samples of two faces, or locators; and heights of its faces.
 
-Another kind of contact derives from it, in a file of its own (see round_contact). Its equations derive from FixedGaps.
+Other kinds of contact derive from FollowingContact (see following_contact).
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ from tolcontact.discretization.plane_minima import PlaneMinima
 from tolcontact.discretization.point_weights import CountedRegion, counted_regions, point_weights
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
-from tolcontact.features.minimum_zone import sum_modes
+from tolcontact.features.zone_kernel import sum_modes
 from tolcontact.geometry.overlap import points_on_rim
 from tolcontact.geometry.surface import Surface
 
@@ -108,7 +108,7 @@ class ContactPoints:
     @cached_property
     def facing(self) -> np.ndarray:
         """The decrease -n^m . n^r (point,) of gaps per unit height of the moving face."""
-        if self.moving_face is None or not self.samples_faces:
+        if self.moving_face is None:
             return np.ones(len(self.P_m))
         triangle, nearest = self.moving_face.nearest(self.P_m)
         return -(self.moving_face.normals(triangle, nearest) * self.n_r).sum(axis=1)
@@ -151,7 +151,7 @@ class ContactPoints:
 
         Raises GeometryFault if no point is left.
         """
-        if self.is_supports or not self.samples_faces:
+        if self.is_supports:
             return self
         free = np.flatnonzero(KDTree(held).query(self.P_m)[0] > distance)
         if not free.size:
@@ -257,8 +257,8 @@ class ContactPoints:
         return gaps if deviations is None else gaps - self.heights(deviations)
 
     def raw_depth(self, X_RM: Float[Array, "row 12"], deviations: Float[Array, "row contributor"]) -> float:
-        """Return the largest penetration [mm] of the points at raw poses X_RM, or a bound, for deviations of the faces."""
-        return max(-float(self.least_gap(X_RM, deviations).min()), 0.0) if self.samples_faces else self.travel(X_RM)
+        """Return the largest penetration [mm] of the points at raw poses X_RM, for deviations of the faces."""
+        return max(-float(self.least_gap(X_RM, deviations).min()), 0.0)
 
     def travel(self, X_RM: Float[Array, "row 12"]) -> float:
         """Return the travel [mm] of the moving face, or of points without one, from the nominal position."""
@@ -274,14 +274,12 @@ class ContactPoints:
     @property
     def curvature(self) -> float:
         """The largest curvature [1/mm] of a reference face that fixed planes represent; 0 if it is flat."""
-        return self.reference_face.curvature if self.reference_face is not None and self.samples_faces else 0.0
+        return 0.0 if self.reference_face is None else self.reference_face.curvature
 
     @property
     def may_miss_ends(self) -> bool:
         """Whether the points may miss contact where faces end, so that places of contact may be searched at every pose."""
-        if self.moving_face is None or self.reference_face is None or self.reference is None:
-            return False
-        if self.is_springy or not self.samples_faces:
+        if self.moving_face is None or self.reference_face is None or self.reference is None or self.is_springy:
             return False
         return not self.has_form or (self.moving_face.is_flat and self.reference_face.is_flat)
 
@@ -293,7 +291,7 @@ class ContactPoints:
     @cached_property
     def weights(self) -> Float[Array, " point"]:
         """The weights of the points (point,), by the areas that they represent; equal ones without sampled faces."""
-        if self.moving_face is None or self.reference_face is None or not self.samples_faces:
+        if self.moving_face is None or self.reference_face is None:
             return np.ones(len(self.P_m))
         return point_weights(self.P_m, self.P_r, self.moving_face, self.reference_face)
 

@@ -12,7 +12,7 @@ from tolcontact.arrays import Array, Float
 from tolcontact.discretization.fixed_contact import ContactPoints
 from tolcontact.discretization.form_points import PairForm
 from tolcontact.discretization.plane_minima import with_former
-from tolcontact.geometry import plane_kernel
+from tolcontact.geometry import region_kernel
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.places import PLAIN, Look, Places, RaisedPlaces
@@ -80,17 +80,17 @@ def _points(
     groups = np.cumsum([0, *map(len, np.array_split(np.arange(total), min(POINT_GROUPS, total)))])
     gaps, heights = np.empty((len(poses), total)), np.zeros((len(poses), total))
     P_m, feet = np.ascontiguousarray(pair.P_m), np.ascontiguousarray(across)
-    plane_kernel.plane_gaps(poses, P_m, *(np.ascontiguousarray(values) for values in (pair.P_r, pair.n_r)), gaps)
+    region_kernel.plane_gaps(poses, P_m, *(np.ascontiguousarray(values) for values in (pair.P_r, pair.n_r)), gaps)
     gaps[:, count:], heights[:, :count] = rim_gaps, pair.form_heights(deviations)
     between = kept = np.zeros((len(poses), 0), dtype=np.int64)
     if retained is not None:
         is_point = (retained >= FIRST_POINT) & (retained < FIRST_POINT + total)
         kept = np.where(is_point, retained - FIRST_POINT, -1)[:, is_point.any(axis=0)]
         between = np.where(retained >= FIRST_PLACE, retained, -1)
-        plane_kernel.keep_over(poses, P_m, feet, *regions, kept)
+        region_kernel.keep_over(poses, P_m, feet, *regions, kept)
     bounds = np.stack([minima.projection_error(poses, deviations), minima.bound(deviations)], axis=1)
     is_promising = np.zeros(gaps.shape, dtype=bool)
-    plane_kernel.write_promising(poses, P_m, feet, gaps - heights, bounds, groups, *regions, kept, is_promising)
+    region_kernel.write_promising(poses, P_m, feet, gaps - heights, bounds, groups, *regions, kept, is_promising)
     if bounds[:, 0].any():
         at_feet = minima.heights(poses, deviations, P_m[None], is_promising[:, :count])
         heights[:, :count] = np.where(is_promising[:, :count], at_feet, heights[:, :count])
@@ -98,12 +98,12 @@ def _points(
     raised = gaps - heights
     raised[:, count:][~is_promising[:, count:]] = np.inf
     lowest = np.empty((len(poses), len(groups) - 1), dtype=np.int64)
-    plane_kernel.lowest_over(poses, P_m, feet, raised, groups, *regions, lowest)
+    region_kernel.lowest_over(poses, P_m, feet, raised, groups, *regions, lowest)
     rows = np.arange(len(poses))[:, None]
     if np.isfinite(depth):
         grown, limits = pair.heights(deviations), minima.bulge(deviations)
         raised -= grown[:, None]
-        plane_kernel.leave_low(poses, P_m, feet, raised, limits, *regions)
+        region_kernel.leave_low(poses, P_m, feet, raised, limits, *regions)
         points = np.concatenate([np.broadcast_to(P_m, (len(poses), *P_m.shape)), feet], axis=1)
         between = with_former(minima.find(poses, deviations, grown, points, raised, limits, depth), between)
     numbers = np.concatenate([kept, lowest], axis=1)

@@ -15,10 +15,10 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.features import FaceDeviation, FormField
-from tolcontact.geometry import minima_kernel, plane_kernel
+from tolcontact.geometry import height_kernel, minima_kernel
+from tolcontact.geometry.height_kernel import HeightSums, HeightTable, Plane
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.places import Places, RaisedPlaces
-from tolcontact.geometry.plane_kernel import HeightSums, HeightTable, Plane
 from tolcontact.geometry.spreading import face_frame
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import SAME_PLACE
@@ -75,7 +75,7 @@ class PlaneMinima:
         P_m differ from pose to pose, or are the same for all poses (m = 1). Heights that are not required are 0.
         """
         heights = np.zeros(is_required.shape)
-        plane_kernel.write_heights(*self._inputs(X_RM, deviations), np.ascontiguousarray(P_m), is_required, heights)
+        height_kernel.write_heights(*self._inputs(X_RM, deviations), np.ascontiguousarray(P_m), is_required, heights)
         return heights
 
     def bulge(self, deviations: Float[Array, "n contributor"]) -> Float[Array, " n"]:

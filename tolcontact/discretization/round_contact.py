@@ -14,7 +14,8 @@ import trimesh
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
-from tolcontact.discretization.fixed_contact import ContactPoints, Offsets
+from tolcontact.discretization.fixed_contact import Offsets
+from tolcontact.discretization.following_contact import FollowingContact
 from tolcontact.discretization.round_points import NO_DIRECTION, NotRoundError, RoundPoint, RoundPoints, arc, tangent_directions
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, RoundSurface, Sphere
 from tolcontact.geometry.surface import Piece, Surface
@@ -31,13 +32,12 @@ NORMAL_TOLERANCE = 1e-7  # between the normals of neighbouring triangles of one 
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RoundContact(ContactPoints):
-    """Contact of balls and shafts with walls: points that follow from every pose, and always have a row.
+class RoundContact(FollowingContact):
+    """Contact of balls and shafts with walls.
 
     round   the balls and shafts, and their walls; P^m, P^r, n^r are their nominal contact points
     """
 
-    samples_faces: ClassVar[bool] = False
     _accuracy_in_words: ClassVar[str] = ", exact on round faces"
 
     round: RoundPoints
@@ -46,12 +46,6 @@ class RoundContact(ContactPoints):
     def between(
         cls, moving: Surface, reference: Surface, reach: float, rounding: float, common: Mapping[str, Any]
     ) -> Self | None:
-        """Return the contact of two faces; None if they may touch in another way.
-
-        reach      [mm]: faces at a larger distance have no points
-        rounding   [mm]: coordinate error of both bodies
-        common     the fields that do not depend on the kind
-        """
         points = round_points(moving, reference, reach)
         if not points:
             return None
@@ -89,19 +83,12 @@ class RoundContact(ContactPoints):
     def stiffness_shares(self) -> np.ndarray:
         return np.where(self.round.points["axis"].any(axis=1), 0.5, 1.0)  # a shaft has two ends
 
-    def touching(
-        self, X_RM: Float[Array, "1 12"], points: Bool[Array, " point"], normals: Float[Array, "k 3"]
-    ) -> Float[Array, "k 3"]:
-        """Return the places of some points that touch at one pose, with normals there, in the frame of the reference part."""
+    def touching(self, X_RM: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         centres, radii, on_moving = (self.round.points[name][points] for name in ("centre", "radius", "on_moving"))
         at_body = np.where(on_moving[:, None], pose.apply(X_RM, centres), centres)
         return np.asarray(at_body - np.where(on_moving, radii, -radii)[:, None] * normals)
 
-    def ends(self) -> tuple[Float[Array, "point 3"], Bool[Array, " point"], Bool[Array, " point"], float]:
-        """Return what must not overhang the other face of a point under load.
-
-        These are nominal places, whether they are on the moving part, whether they must not, and the overhang [mm] that may be.
-        """
+    def ends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         points = self.round.points
         is_inside = np.logical_not(points["cut"].any(axis=1))  # a shaft may continue beyond a wall
         return points["centre"], points["on_moving"], is_inside, OVERHANG_SHARE * float(points["radius"].max())

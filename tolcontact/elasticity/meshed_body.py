@@ -16,10 +16,11 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.child import ChildDiedError, run_child
 from tolcontact.code_cache import digest
 from tolcontact.elasticity.elastic_body import ElasticBody, rigid_motions
-from tolcontact.elasticity.tetrahedra import SurfacePads, Tetrahedra, node_volumes, stiffness_of, straightened
+from tolcontact.elasticity.pads import SurfacePads
+from tolcontact.elasticity.tetrahedra import Tetrahedra, node_volumes, stiffness_of, straightened
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.triangle_mesh import edges, triangle_tree
-from tolcontact.replacing import temporary_folder
+from tolcontact.temporary import temporary_folder
 
 PROGRAM = Path(__file__).with_name("mesher.py")
 VOLUME_ERROR = 0.02  # relative, of a mesh: flat facets of round faces

@@ -13,7 +13,8 @@ from scipy import io, sparse
 
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.errors import GeometryFault
-from tolcontact.tables import fault_of, text_of
+from tolcontact.input_files import fault_of
+from tolcontact.tables import text_of
 
 MAX_BYTES, MAX_FREEDOMS = 1 << 30, 6000  # dense: 288 MB
 START_BYTES = 1 << 24  # nodes and coordinate systems may stand before a matrix

@@ -1,6 +1,5 @@
 """The fit of a fastener in its holes in the nominal assembly, and the faults of what it refers to. Lengths in mm."""
 
-import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -166,12 +165,14 @@ def part_fit(part: Part, face: Face | None, holes: Holes, seat: PlaneFeature | N
     radii = {one.radius for one in descriptions if one.kind == "cylinder" and one.radius and not one.is_inner}
     for radius in sorted(radii, reverse=True):
         face = part.face(CylinderSelection(radius=radius, inner=False))
-        with contextlib.suppress(GeometryFault):  # several cylinders of one radius are no shank
+        try:
             shank = placed_cylinder(face)
-            axis = axis_of(shank, shank.axis)
-            low, high = axis.extent(shank)
-            if axis.distance(first.centre) < shank.size / 2 and low < axis.station(first.centre) < high:
-                return _fit_of(face, shank, holes, seat)
+        except GeometryFault:  # several cylinders of one radius are no shank
+            continue
+        axis = axis_of(shank, shank.axis)
+        low, high = axis.extent(shank)
+        if axis.distance(first.centre) < shank.size / 2 and low < axis.station(first.centre) < high:
+            return _fit_of(face, shank, holes, seat)
     raise GeometryFault(
         f'no outer cylinder of part "{part.name}" stands in the first hole; move the part there, or give the face of '
         "its shank in place of the part"

@@ -21,12 +21,6 @@ from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import ON_FACE
 from tolcontact.geometry.triangle_mesh import quadrature
 
-# Of fields that are very smooth, twice and once differentiable.
-COVARIANCES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-    "squared exponential": lambda distance: np.exp(-(distance**2) / 2),
-    "matern 5/2": lambda distance: (1 + (scaled := np.sqrt(5) * distance) + scaled**2 / 3) * np.exp(-scaled),
-    "matern 3/2": lambda distance: (1 + (scaled := np.sqrt(3) * distance)) * np.exp(-scaled),
-}
 PLACE_SPACING = 1 / 4  # of the correlation length
 MIN_PLACES, MAX_PLACES = 600, 20_000  # of a face, over which areas are summed
 MAX_EXCESS = 8  # times the intended number of places
@@ -38,6 +32,30 @@ NODES = 16  # of a line
 MIN_LENGTH = 1e-9  # of a displacement, relative to the largest
 START = 0.01  # rad before the first line, where no other line is: azimuths are counted from here
 TERMS = 7  # of the displacement of a surface: its growth, then a translation and a rotation
+
+
+def squared_exponential(distance: np.ndarray) -> np.ndarray:
+    """Return the covariance of very smooth fields."""
+    return np.asarray(np.exp(-(distance**2) / 2))
+
+
+def matern_5_2(distance: np.ndarray) -> np.ndarray:
+    """Return the covariance of fields that are twice differentiable."""
+    scaled = np.sqrt(5) * distance
+    return np.asarray((1 + scaled + scaled**2 / 3) * np.exp(-scaled))
+
+
+def matern_3_2(distance: np.ndarray) -> np.ndarray:
+    """Return the covariance of fields that are once differentiable."""
+    scaled = np.sqrt(3) * distance
+    return np.asarray((1 + scaled) * np.exp(-scaled))
+
+
+COVARIANCES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "squared exponential": squared_exponential,
+    "matern 5/2": matern_5_2,
+    "matern 3/2": matern_3_2,
+}
 
 
 class Lengths(NamedTuple):

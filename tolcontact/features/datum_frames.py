@@ -16,8 +16,9 @@ from scipy.linalg import block_diag
 from tolcontact.declaration import OUTSIDE, DatumTargets, Feature, Part, Pattern
 from tolcontact.features.feature_geometry import PlaneFeature
 from tolcontact.features.form_field import FormField
-from tolcontact.features.minimum_zone import minimax, sum_modes
+from tolcontact.features.minimum_zone import minimax
 from tolcontact.features.nominal_feature import NominalFeature, padded
+from tolcontact.features.zone_kernel import sum_modes
 from tolcontact.geometry.tolerances import MIN_PART
 
 FIELDS_AT_ONCE = 512
@@ -166,15 +167,16 @@ def datum_frame(
 
     The datums of one compartment count together, by least squares of their coordinates. A plane alone is then moved to where it
     touches its feature outside the material (ISO 5459), unless its association is by least squares. Angles are weighed by
-    `reach` [mm]. Compartments that are `orientation_only` lock no translations.
+    `reach` [mm]. Compartments that are `orientation_only` lock no translations (ISO 5459, "><").
     """
     to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
     motion, free, shifts = np.zeros((6, columns)), np.eye(6), list[DatumShift]()
     for compartment, is_turned in zip(system, orientation_only, strict=True):
+        # J (coordinate, 6): coordinates of the datum features of a compartment for unit displacements.
         J = np.vstack([datum.geometry.about(centre) for datum in compartment]) @ to_twist
         coordinates = np.vstack([padded(datum.coordinates, motion.shape[1]) for datum in compartment])
         selection, jacobian, values = np.eye(len(J)), J, coordinates
-        if is_turned:
+        if is_turned:  # only combinations of coordinates that translations do not change: rotations alone affect them
             selection = scipy.linalg.null_space(J[:, :3].T, rcond=RANK_TOLERANCE)
             jacobian, values = selection.T @ J, selection.T @ coordinates
         U, S, Vt = np.linalg.svd(jacobian @ free)
@@ -185,8 +187,9 @@ def datum_frame(
             motion = motion + moves @ (values - jacobian @ motion)
             if shift := _datum_shift(compartment, coordinates - J @ motion, J @ free, is_turned=is_turned):
                 moves, plane = moves @ selection.T, compartment[0].geometry
+                assert isinstance(plane, PlaneFeature)
                 shift_motion = moves[:, shift.coordinates]
-                if shift.form is None and isinstance(plane, PlaneFeature):
+                if shift.form is None:
                     shift_motion = (moves @ plane.values @ np.concatenate([plane.normal, np.zeros(3)]))[:, None]
                 motion = np.hstack([motion, shift_motion])
                 shifts.append(shift)
@@ -199,6 +202,7 @@ def _datum_shift(compartment: Datums, residuals: np.ndarray, tilts: np.ndarray, 
 
     residuals   (coordinate, column): coordinates of the features relative to their datum, per unit deviation
     tilts       (coordinate, n): coordinates for the motions that the datums before leave free
+    is_turned   whether rotations alone affect the datum
     """
     (datum, *further) = compartment
     geometry = datum.geometry

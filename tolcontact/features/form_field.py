@@ -78,7 +78,7 @@ class FormField:
     def zone(self) -> tuple[ZoneMember, ...]:
         """The members of the zone of the form, at the places."""
         members = self.associated.members(self.places)
-        return tuple((indices, self.associated.rows(self.places[indices])) for indices in members)
+        return tuple(ZoneMember(indices, self.associated.rows(self.places[indices])) for indices in members)
 
     @cached_property
     def place_heights(self) -> np.ndarray:

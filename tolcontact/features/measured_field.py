@@ -27,7 +27,7 @@ from tolcontact.features.form_field import (
     scales_within,
     without_displacements,
 )
-from tolcontact.features.minimum_zone import minimum_widths
+from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder
 from tolcontact.geometry.measured_points import measured_points
 from tolcontact.geometry.spreading import spread
@@ -43,7 +43,7 @@ MAX_STATIONS_PER_POINT = 2
 MAX_FREEDOM_SHARE = 0.98  # of the number of points: with more, points left out cannot be predicted
 MIN_POWER = 1e-300
 GAIN_SHARE = 0.002  # of the heights: more stations must predict points better than that
-SIGNIFICANT = 2.0  # standard deviations of an error: the same, where points scatter
+ERROR_LIMIT = 2.0  # standard deviations of an error: the same, where points scatter
 COVARIANCE: Covariance = "matern 5/2"  # for the heights between stations
 MIN_EXTENT_SHARE = 0.5  # of a face, in each of its principal directions
 MIN_POINTS = 24
@@ -53,7 +53,7 @@ MIN_VARIANCE = 1e-8  # of the largest: a component with less is rounding
 MAX_LOST_SHARE = 0.25  # of the form: what the field may leave out
 MAX_EXCESS = 3.0  # times the largest height at the points: what the field may reach between them
 NEIGHBOURS = 8  # of a point, whose deviations from the field are compared with its own
-SIGNIFICANT_FORM = 5.0  # standard deviations of a mean, above which deviations from the field are more than scatter
+SCATTER_LIMIT = 5.0  # standard deviations of a mean, above which deviations from the field are more than scatter
 STEP_SHARE = 1e-4  # of the correlation length: steps of slopes
 
 
@@ -107,7 +107,7 @@ class HeightRegression:
                 break
         least = min(error for _, error in trials)
         points = sum(len(scan.feet) for scan in trials[-1][0].samples(scans))
-        enough = GAIN_SHARE + (1 + SIGNIFICANT / points**0.5) * least
+        enough = GAIN_SHARE + (1 + ERROR_LIMIT / points**0.5) * least
         return next(regression for regression, error in trials if error <= enough)
 
     def _errors(self, feet: np.ndarray, heights: np.ndarray) -> np.ndarray:
@@ -139,25 +139,26 @@ class HeightRegression:
             solutions.append(scipy.linalg.solve(matrix, functions.T @ heights, assume_a="pos"))
         return np.asarray(scipy.linalg.solve_triangular(self._factor, np.hstack(solutions), lower=True, trans=1))
 
-    def values(self, points: np.ndarray) -> np.ndarray:
+    def covariances(self, points: np.ndarray) -> np.ndarray:
         """Return the covariances (point, station) of points (point, 3) with the stations."""
         return covariance(self.form, self.lengths, self.associated.surface, points, self.stations)
 
-    def heights(self, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return the heights (point, part) [mm] at points (point, 3) without displacements of sections or lines.
+    def form_heights(self, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Return the heights (point, part) [mm] of fields of weights (station, part) at points (point, 3), as form alone.
 
-        weights   (station, part)
+        They are `covariances(points) @ weights`, the heights over the nominal surface, without the displacements of the
+        sections or lines of the points.
         """
         return associated_covariance(self.form, self.lengths, self.associated, points, self.stations) @ weights
 
     def _functions(self, points: np.ndarray) -> np.ndarray:
         """Return functions (point, station) whose coefficients have the variance 1 each, at points (point, 3)."""
-        return np.asarray(scipy.linalg.solve_triangular(self._factor, self.values(points).T, lower=True).T)
+        return np.asarray(scipy.linalg.solve_triangular(self._factor, self.covariances(points).T, lower=True).T)
 
     @cached_property
     def _factor(self) -> np.ndarray:
         """The Cholesky factor of the covariance of stations."""
-        return np.linalg.cholesky(self.values(self.stations) + ROUNDING * np.eye(len(self.stations)))
+        return np.linalg.cholesky(self.covariances(self.stations) + ROUNDING * np.eye(len(self.stations)))
 
 
 def _batches(scans: Sequence[Scan]) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -173,9 +174,9 @@ def _batches(scans: Sequence[Scan]) -> list[tuple[np.ndarray, np.ndarray]]:
 def measured_field(form: Form, face: Surface, associated: AssociatedSurface) -> FormField:
     """Return the form field of faces whose points are in files, in the frame of their part. Raises GeometryFault."""
     assert form.measured is not None
-    clouds, form = measured_points(form.measured), replace(form, covariance=COVARIANCE)
+    pattern, form = form.measured, replace(form, covariance=COVARIANCE)
     everywhere = associated.surface.project(spread(face.mesh, STATIONS[0], None))
-    scans = [_scan(cloud, str(path), face, everywhere, associated) for path, cloud in clouds.items()]
+    scans = [_scan(cloud, str(path), face, everywhere, associated) for path, cloud in measured_points(pattern).items()]
     regression = HeightRegression.of(form, face, associated, scans)
     scans = regression.samples(scans)
     weights = regression.weights(scans)
@@ -183,7 +184,7 @@ def measured_field(form: Form, face: Surface, associated: AssociatedSurface) -> 
     lengths = _lengths(regression, weights)
     places, areas = associated.places(face, lengths)
     shares = areas / areas.sum()
-    heights, removed = without_displacements(regression.heights(places, weights), associated, places, shares)
+    heights, removed = without_displacements(regression.form_heights(places, weights), associated, places, shares)
     mixes, size, spreads = _principal_components(heights, form.modes)
     kept, lost = mixes.shape[1] - 1, float(np.mean([loss**2 for _, loss in fits]))
     left_out = (float((spreads[kept:] ** 2).sum()) + lost) / max(size**2 + float((spreads**2).sum()) + lost, 1e-300)
@@ -259,11 +260,11 @@ def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> tuple
     Both are in mm. What neighbours deviate by equally is form that the field leaves out; the rest is scatter.
     Raises GeometryFault if the field does not agree with the points.
     """
-    feet, values = scan.feet, regression.values(scan.feet) @ weights
+    feet, values = scan.feet, regression.covariances(scan.feet) @ weights
     deviations = scan.heights - values
     # Equal or opposite: waves of a few points are opposite at the second neighbour or the third.
     products = deviations[:, None] * deviations[scipy.spatial.KDTree(feet).query(feet, NEIGHBOURS + 1)[1][:, 1:]]
-    shared = float((np.abs(products.mean(axis=0)) - SIGNIFICANT_FORM * products.std(axis=0) / np.sqrt(len(feet))).max())
+    shared = float((np.abs(products.mean(axis=0)) - SCATTER_LIMIT * products.std(axis=0) / np.sqrt(len(feet))).max())
     lost = float(np.sqrt(max(shared, 0.0)))
     height = float(np.hypot(values.std(), lost))
     if lost > MAX_LOST_SHARE * height:
@@ -272,7 +273,7 @@ def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> tuple
             f"{lost:.2g} mm of its {height:.2g} mm (root mean square), and up to {np.abs(deviations).max():.2g} mm; filter "
             "short waves out of the points, or divide the face into several features"
         )
-    elsewhere = regression.values(regression.stations) @ weights
+    elsewhere = regression.covariances(regression.stations) @ weights
     excess = float(np.abs(elsewhere).max() / max(np.abs(values).max(), 1e-300))
     if excess > MAX_EXCESS:
         raise GeometryFault(
@@ -280,7 +281,7 @@ def _fit(scan: Scan, weights: np.ndarray, regression: HeightRegression) -> tuple
             "between or beside them; measure more points, also along the rim, or filter short waves out of the points"
         )
     rows = regression.associated.rows(feet)
-    return float(minimum_widths([(np.arange(len(feet)), rows)], values[None])[0]), lost
+    return float(minimum_widths([ZoneMember(np.arange(len(feet)), rows)], values[None])[0]), lost
 
 
 def _lengths(regression: HeightRegression, weights: np.ndarray) -> Lengths:
@@ -295,12 +296,12 @@ def _lengths(regression: HeightRegression, weights: np.ndarray) -> Lengths:
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     step = STEP_SHARE * min(regression.lengths)
     slopes = np.stack([
-        (regression.heights(stations + arms, weights) - regression.heights(stations - arms, weights)) / (2 * step)
+        (regression.form_heights(stations + arms, weights) - regression.form_heights(stations - arms, weights)) / (2 * step)
         for arms in (step * across, step * np.cross(normals, across))
     ]).reshape(2, -1)  # fmt: skip
     moments = slopes @ slopes.T / slopes.shape[1]
     steepest = np.diagonal(moments) if is_axial else np.full(2, np.linalg.eigvalsh(moments)[-1])
-    height2 = float((regression.heights(stations, weights) ** 2).mean())
+    height2 = float((regression.form_heights(stations, weights) ** 2).mean())
     return Lengths(*(
         min(length, float(np.sqrt(height2 / slope2))) if slope2 > 0 else length
         for length, slope2 in zip(regression.lengths, steepest, strict=True)

@@ -1,9 +1,9 @@
 """The features of a model with numbers: their freedoms, made once, and how faces deviate with everything that varies."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import compress
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from tolcontact.features.freedoms import DATUM, FEATURE, FORM, Freedom
 from tolcontact.features.nominal_feature import Expansion, FaceDeviation, NominalFeature, Placement, moving_faces, padded
 from tolcontact.features.nominal_pattern import MIXED, RELATIVE, NominalPattern, mobile, tolerance_layers, unlike_members
 from tolcontact.features.tolerance_kinds import form_field_of, form_tolerance
-from tolcontact.geometry.faces import Meshes, face_area, patch
+from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
 from tolcontact.geometry.tolerances import SAME_SIZE
 
 MIN_SHARE = 1e-6  # of a face's area: a smaller common part of two faces does not count
@@ -40,6 +40,15 @@ class Features:
     _gauges: dict[str, NominalFeature] = field(default_factory=dict)
     _targets: dict[tuple[int, str], tuple[NominalFeature, ...]] = field(default_factory=dict)
     _used_faces: dict[tuple[Any, ...], FaceDeviation] = field(default_factory=dict)
+
+    @cached_property
+    def _coefficients(self) -> dict[str, dict[int, float]]:
+        """The coefficients of the causes that expand each part, by its name and their indices."""
+        coefficients = defaultdict[str, dict[int, float]](dict)
+        for index, cause in enumerate(self.causes):
+            for part, coefficient in cause.expands.items():
+                coefficients[part][index] = coefficient
+        return dict(coefficients)
 
     @property
     def faces(self) -> tuple[FaceDeviation, ...]:
@@ -154,22 +163,15 @@ class Features:
         surfaces = tuple(patch(face, meshes) for face in feature.faces)
         areas = tuple(face_area(face, meshes) for face in feature.faces)
         for earlier in (*self.features.values(), *members):
-            if earlier.feature.part is feature.part and any(
-                face.share(earlier_face, meshes[feature.part]) > MIN_SHARE
-                for face in compress(areas, moving_faces(feature))
-                for earlier_face in compress(earlier.areas, moving_faces(earlier.feature))
-            ):
-                raise GeometryFault(
-                    f'it shares a face with feature "{earlier.feature.name}", so that would deviate twice; give all '
-                    "tolerances of a face to one feature"
-                )
+            if earlier.feature.part is feature.part:
+                _check_disjoint(feature, areas, earlier, meshes)
         geometry = feature_geometry(surfaces)
         return NominalFeature(feature, part, geometry, surfaces, areas, np.zeros((len(geometry.names), 0)))
 
     def expansion(self, part: Part) -> Expansion | None:
         """Return the expansion of a part by temperatures, once all features have been added; None if none expands it."""
-        coefficients = {k: cause.expands[part.name] for k, cause in enumerate(self.causes) if part.name in cause.expands}
-        if not coefficients:
+        coefficients = self._coefficients.get(part.name)
+        if coefficients is None:
             return None
         return Expansion(self._next_column + np.array([*coefficients]), np.array([*coefficients.values()], dtype=float))
 
@@ -312,6 +314,17 @@ def _follow_datums(pattern: NominalPattern, start: int, freedoms: list[Freedom])
         coordinates[:, layer.columns] = layer.added
         coordinates[:, places] += effect @ layer.frame.motion[:, kept]
     return shifts, coordinates
+
+
+def _check_disjoint(feature: Feature, areas: Sequence[FaceArea], earlier: NominalFeature, meshes: Meshes) -> None:
+    """Raise GeometryFault if a face that deviates with a feature also deviates with an earlier feature of its part."""
+    for face, moves in zip(areas, moving_faces(feature), strict=True):
+        for earlier_face, earlier_moves in zip(earlier.areas, moving_faces(earlier.feature), strict=True):
+            if moves and earlier_moves and face.share(earlier_face, meshes[feature.part]) > MIN_SHARE:
+                raise GeometryFault(
+                    f'it shares a face with feature "{earlier.feature.name}", so that would deviate twice; give all '
+                    "tolerances of a face to one feature"
+                )
 
 
 def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:

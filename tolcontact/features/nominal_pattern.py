@@ -91,7 +91,8 @@ class NominalPattern:
     @cached_property
     def centre(self) -> np.ndarray:
         """The mean (3,) [mm] of the centres of the members."""
-        return np.mean([geometry.centre for geometry in self.geometries], axis=0)
+        centres = [geometry.centre for geometry in self.geometries]
+        return centres[0] if len(centres) == 1 else np.mean(centres, axis=0)
 
     @cached_property
     def reach(self) -> float:

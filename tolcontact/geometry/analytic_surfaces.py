@@ -94,9 +94,6 @@ class AnalyticSurface(ABC):
 class RoundSurface(AnalyticSurface):
     """A surface with tangent planes all around its hollow side: a cylinder, cone or sphere."""
 
-    def height(self, radial: Any, along: Any) -> Any:
-        return radial - self.radius
-
     def tangent(self, direction: np.ndarray) -> "Plane":
         """Return the tangent plane in a direction (3,) from the axis or centre; its normal points inward."""
         return Plane(self.origin + self.radius * direction, -direction)
@@ -113,9 +110,11 @@ class Plane(AnalyticSurface):
     kind = "plane"
 
     def height(self, radial: Any, along: Any) -> Any:
+        """Return the height over the plane [mm]."""
         return along
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return heights (point,) [mm] over the plane, and its normal (point, 3)."""
         return (points - self.origin) @ self.axis, np.broadcast_to(self.axis, points.shape)
 
 
@@ -126,11 +125,17 @@ class Cylinder(RoundSurface):
     kind, sizes = "cylinder", ("radius",)
     radius: float
 
+    def height(self, radial: Any, along: Any) -> Any:
+        """Return the signed distance [mm] from the cylinder."""
+        return radial - self.radius
+
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return signed distances (point,) [mm], and their gradients (point, 3)."""
         radial, outward, along = self.around_axis(points)
         return self.height(radial, along), outward
 
     def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Return the nearest point of the generator in a direction from the axis."""
         return self.origin + ((point - self.origin) @ self.axis) * self.axis + self.radius * direction
 
 
@@ -146,6 +151,7 @@ class Cone(RoundSurface):
         return radial * np.cos(self.angle) - along * np.sin(self.angle)
 
     def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return signed distances [mm]."""
         return self.height(radial, np.abs(along))
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -156,9 +162,11 @@ class Cone(RoundSurface):
         return self.height(radial, side * along), slope
 
     def tangent(self, direction: np.ndarray) -> Plane:
+        """Return the tangent plane in a direction (3,) from the axis; its normal points inward."""
         return Plane(self.origin, math.sin(self.angle) * self.axis - math.cos(self.angle) * direction)
 
     def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Return the nearest point of the generator in a direction from the axis."""
         line = math.cos(self.angle) * self.axis + math.sin(self.angle) * direction
         return self.origin + ((point - self.origin) @ line) * line
 
@@ -170,14 +178,21 @@ class Sphere(RoundSurface):
     kind, sizes = "sphere", ("radius",)
     radius: float
 
+    def height(self, radial: Any, along: Any) -> Any:
+        """Return the signed distance [mm] from the sphere."""
+        return radial - self.radius
+
     def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return signed distances [mm]."""
         return self.height(np.hypot(radial, along), along)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return signed distances (point,) [mm], and their gradients (point, 3)."""
         radial, outward = _length_and_direction(points - self.origin)
         return self.height(radial, 0.0), outward
 
     def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Return the surface point in a direction from the centre."""
         return self.origin + self.radius * direction
 
 
@@ -190,6 +205,7 @@ class Torus(AnalyticSurface):
     minor: float
 
     def height(self, radial: Any, along: Any) -> Any:
+        """Return the signed distance [mm] from the tube."""
         return radial - self.minor
 
     def from_circle(self, radial: Any, outward: Any, along: Any, axis: Any) -> Any:
@@ -200,9 +216,11 @@ class Torus(AnalyticSurface):
         return (radial - self.radius) * outward + along * axis
 
     def height_beside_axis(self, radial: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return signed distances [mm]."""
         return self.height(np.hypot(radial - self.radius, along), along)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return signed distances (point,) [mm], and their gradients (point, 3)."""
         radial, outward, along = self.around_axis(points)
         tube, slope = _length_and_direction(self.from_circle(radial[:, None], outward, along[:, None], self.axis))
         return self.height(tube, along), slope

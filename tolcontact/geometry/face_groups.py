@@ -19,7 +19,7 @@ import trimesh
 from tolcontact.declaration.selection import FACE_GROUPS
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, axes_across, azimuths
-from tolcontact.geometry.nearest_elements import SolidBody
+from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.tolerances import RESIDUALS, ROUNDING, SAME_PLACE, SQUARE
 from tolcontact.readable import Readable
 from tolcontact.texts import shown_name
@@ -217,7 +217,7 @@ def _is_interrupted(body: SolidBody, surface: Cylinder | Cone, parts: Sequence[n
         [(points.reshape(-1, 3, 3) + np.roll(points.reshape(-1, 3, 3), 1, axis=1)) / 2 for points in corners]
     )
     chord = float(np.abs(surface.distance(middles.reshape(-1, 3))[0]).max())
-    return bool((body.depth_inside(circle) < CHORD_FACTOR * chord + margin).all())
+    return bool((body.depth(circle) < CHORD_FACTOR * chord + margin).all())
 
 
 def _slots(

@@ -8,14 +8,14 @@ The form deviation of a plane counts along its own normal, never along the norma
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Protocol
 
 import igl
 import numpy as np
 import trimesh
 
 from tolcontact import poses as pose
-from tolcontact.geometry.nearest_elements import SolidBody
+from tolcontact.geometry.body_overlap import SolidBody
 from tolcontact.geometry.spreading import unique_points
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.triangle_mesh import rim, subdivided
@@ -138,6 +138,19 @@ class BodyFace:
         return max((piece.face.chord_height for piece in self.face.pieces), default=0.0)
 
 
+class PairForm(Protocol):
+    """The form deviations of both faces of a pair."""
+
+    def take(self, rows: slice | np.ndarray) -> "PairForm":
+        """Return the form deviations of some rows."""
+
+    def at_face(self, k: int, row: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Return the form deviation (k,) [mm] of one face at `places` (k, 3), each in its own row; face 0 is the moving one."""
+
+    def highest(self) -> np.ndarray:
+        """Return upper bounds (face, row) [mm] of the form deviations of both faces."""
+
+
 @dataclass(frozen=True, eq=False)
 class FacePair:
     """The faces of a pair, for checks at any pose. Depths up to `rounding` [mm], the coordinate error of files, are ignored."""
@@ -146,7 +159,7 @@ class FacePair:
     reference: BodyFace
     rounding: float = 0.0
 
-    def penetrate(self, X_RM: np.ndarray, heights: np.ndarray, form: Any = None) -> np.ndarray:
+    def penetrate(self, X_RM: np.ndarray, heights: np.ndarray, form: PairForm | None = None) -> np.ndarray:
         """Return whether (row,) either face penetrates the other body at X_RM (row, 12); `heights` and `form` as in `depth`."""
         hits = np.zeros(len(X_RM), dtype=bool)
         for every in (THINNED, 1):
@@ -155,13 +168,11 @@ class FacePair:
             hits[rows] = self.depth(X_RM[rows], heights[rows], row_form, every=every) > 0
         return hits
 
-    def depth(self, X_RM: np.ndarray, heights: np.ndarray, form: Any = None, *, every: int = 1) -> np.ndarray:
+    def depth(self, X_RM: np.ndarray, heights: np.ndarray, form: PairForm | None = None, *, every: int = 1) -> np.ndarray:
         """Return the largest depth (row,) [mm] of either face in the other's body at X_RM (row, 12).
 
         `heights` (row,) [mm] is the sum of the outward offsets of both faces; each face counts it in full. With a `form`, the
-        local form deviations of both faces are added: it has `take(rows)`, `at_face(k, row, points)` (k,) [mm] with each point
-        in its own row, and upper bounds `highest()` (face, row) [mm]; face 0 is the moving one. Of the points that may lie
-        inside, one in `every` is checked.
+        local form deviations of both faces are added. Of the points that may lie inside, one in `every` is checked.
         """
         largest = np.zeros(len(X_RM))
         highest = np.zeros((2, len(X_RM))) if form is None else form.highest()

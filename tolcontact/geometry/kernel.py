@@ -1,10 +1,10 @@
-"""Compiled gaps where two bodies can touch, at corners on facets and edges across edges, and the choice among these points."""
+"""Compiled gaps at the points where two bodies can touch: corners on facets, and edges across edges."""
 
 import math
 
 import numpy as np
 
-from tolcontact.compiled import inlined_uncounted, uncounted
+from tolcontact.compiled import inlined_uncounted
 from tolcontact.geometry.vector_kernel import (
     along,
     cross,
@@ -31,7 +31,6 @@ INSIDE = 1e-9  # mm: contact points that are no deeper count as touching
 TINY = 1e-300
 ORIGIN = (0.0, 0.0, 0.0)
 NOWHERE = (np.inf, ORIGIN, ORIGIN, ORIGIN)  # gap, point, projection and normal of elements that do not meet
-NEARLY_PARALLEL = 1e-3  # sine of the angle between edges, below which their common normal does not give their distance
 
 
 @inlined_uncounted
@@ -168,148 +167,3 @@ def edge_on_edge(A, B, index_A, index_B, flat, plane, spare, reach, X, x, d):  #
             return NOWHERE
     is_slanted = plane >= 0 and reach[3] * abs(crossing) < length < MAX_SLOPE * abs(crossing)
     return height, move_back(X, y), projection, scaled(1 / crossing, c) if is_slanted else m
-
-
-@uncounted
-def keep_shallowest(candidates, touching, gaps, least):  # type: ignore[no-untyped-def]
-    """Drop all but the nearest facet of a corner that is behind several: it leaves through that one. Facing planes are kept.
-
-    A corner may be behind several facets by no more than `least` [mm].
-    """
-    best, owner_of_best = -1, -1
-    for s in touching:
-        kind = candidates.kinds[s]
-        if kind == EDGE_ON_EDGE or not gaps[s] < -least:
-            continue
-        owner = 2 * candidates.firsts[s] if kind == CORNER_ON_FACET else 2 * candidates.seconds[s] + 1
-        if owner != owner_of_best:
-            best, owner_of_best = s, owner
-        elif gaps[s] <= gaps[best]:
-            if candidates.planes[s] < 0 and gaps[s] < gaps[best]:
-                gaps[s] = np.inf
-        else:
-            if candidates.planes[best] < 0:
-                gaps[best] = np.inf
-            best = s
-
-
-@uncounted
-def drop_beyond_ridges(candidates, touching, gaps, tie):  # type: ignore[no-untyped-def]
-    """Drop a facet that a corner touches, with a gap of at most `tie` [mm], if it touches a facing plane beyond a convex edge.
-
-    A corner is outside if it is in front of one of the two: held in front of both, it could not leave along either.
-    """
-    first, owner_of_first = 0, -1
-    for k in range(touching.size):
-        s = touching[k]
-        kind = candidates.kinds[s]
-        if kind == EDGE_ON_EDGE:
-            return
-        owner = 2 * candidates.firsts[s] if kind == CORNER_ON_FACET else 2 * candidates.seconds[s] + 1
-        if owner != owner_of_first:
-            first, owner_of_first = k, owner
-        if candidates.planes[s] >= 0 and -tie <= gaps[s] <= tie:
-            for other in touching[first:k]:
-                if candidates.ridges[other] == candidates.planes[s] and gaps[other] <= tie:
-                    gaps[other] = np.inf
-
-
-@uncounted
-def is_near(candidates, s, projection, projections, touching, gaps, distance):  # type: ignore[no-untyped-def]
-    """Return whether a contact point of facing planes is within `distance` of another one at which they touch."""
-    for neighbour in touching:
-        if candidates.planes[neighbour] == candidates.planes[s] and gaps[neighbour] < np.inf:
-            difference = minus(row(projections, neighbour), projection)
-            if dot(difference, difference) <= distance * distance:
-                return True
-    return False
-
-
-@uncounted
-def least(touching, gaps):  # type: ignore[no-untyped-def]
-    """Return the smallest gap of candidates that touch; infinite if there are none."""
-    least = np.inf
-    for s in touching:
-        least = min(least, gaps[s])
-    return least
-
-
-@uncounted
-def choose(touching, gaps, projections, retained, directions, is_chosen, labels):  # type: ignore[no-untyped-def]
-    """Write the labels (p,) of relevant points: retained ones, those with the smallest gaps, and the outermost; -1 for none.
-
-    Return the number of points.
-    """
-    number, count = 0, labels.size - (directions.shape[0] if touching.size > labels.size else 0)
-    for s in touching:
-        is_chosen[s] = gaps[s] == np.inf
-    for s in retained:
-        if s >= 0 and gaps[s] < np.inf and not is_chosen[s]:
-            labels[number], is_chosen[s], number = s, True, number + 1
-    while number < count:
-        shallowest, gap = -1, np.inf
-        for s in touching:
-            if gaps[s] < gap and not is_chosen[s]:
-                shallowest, gap = s, gaps[s]
-        if shallowest < 0:
-            labels[number:] = -1
-            return number
-        labels[number], is_chosen[shallowest], number = shallowest, True, number + 1
-    for direction in directions:
-        outermost, farthest = -1, -np.inf
-        for s in touching:
-            if gaps[s] < np.inf:
-                distance = dot(direction, row(projections, s))
-                if distance > farthest:
-                    outermost, farthest = s, distance
-        if outermost >= 0 and not is_chosen[outermost]:
-            labels[number], is_chosen[outermost], number = outermost, True, number + 1
-    labels[number:] = -1
-    return number
-
-
-@inlined_uncounted
-def _nominal_height(A, B, candidates, s, X, n, point, projection):  # type: ignore[no-untyped-def]
-    """Return the nominal height of candidate s: the height of its point over its projection along n, or along R'n.
-
-    Two edges may have shifted along each other: their height is the distance of their lines.
-    """
-    arm = minus(point, projection)
-    if candidates.kinds[s] == EDGE_ON_EDGE:
-        start_A, start_B = row_of(A.edges, candidates.firsts[s], 0), row_of(B.edges, candidates.seconds[s], 0)
-        d = minus(row_of(A.edges, candidates.firsts[s], 1), start_A)
-        e = minus(row_of(B.edges, candidates.seconds[s], 1), start_B)
-        arm = minus(start_A, start_B)
-        arm = along(arm, -dot(arm, e) / dot(e, e), e)
-        across = along(d, -dot(d, e) / dot(e, e), e)
-        if dot(across, across) > NEARLY_PARALLEL * NEARLY_PARALLEL * dot(d, d):
-            arm = along(arm, -dot(arm, across) / dot(across, across), across)
-    return max(dot(n, arm), dot(turn_back(X, n), arm))  # whichever body the normal belongs to
-
-
-@uncounted
-def drop_passed(A, B, candidates, passed, X, touching, gaps, all_points, is_held):  # type: ignore[no-untyped-def]
-    """Drop points that are nominally deeper than `passed` [mm] and have a held corner: the body penetrated at that corner.
-
-    The corners of a point are the corner itself, or the ends of both edges. `is_held` (corner,) is false before and after, for
-    the corners of the moving body followed by the corners of the reference body.
-    """
-    points, projections, normals = all_points
-    count = A.vertices.shape[0]
-    for is_first in (True, False):
-        for s in touching:
-            is_edge = candidates.kinds[s] == EDGE_ON_EDGE
-            owner = candidates.firsts[s] if candidates.kinds[s] == CORNER_ON_FACET else count + candidates.seconds[s]
-            height = _nominal_height(A, B, candidates, s, X, row(normals, s), row(points, s), row(projections, s))
-            has_passed = height < -passed
-            if is_first and not is_edge and not has_passed and gaps[s] <= INSIDE:
-                is_held[owner] = True
-            elif not is_first and has_passed and candidates.planes[s] < 0 and gaps[s] < -INSIDE:
-                if is_edge:
-                    for end in range(2):
-                        is_at_A = is_held[A.ends[candidates.firsts[s], end]]
-                        if is_at_A or is_held[count + B.ends[candidates.seconds[s], end]]:
-                            gaps[s] = np.inf
-                elif is_held[owner]:
-                    gaps[s] = np.inf
-    is_held[:] = False

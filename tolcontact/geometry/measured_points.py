@@ -7,7 +7,8 @@ import numpy as np
 import trimesh
 
 from tolcontact.errors import GeometryFault
-from tolcontact.tables import MAX_NUMBER, check_inputs, number, text_of
+from tolcontact.input_files import check_inputs
+from tolcontact.tables import MAX_NUMBER, number, text_of
 from tolcontact.texts import clipped
 
 MIN_FILES = 3  # smallest number of parts with a meaningful spread

@@ -22,10 +22,11 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel, places_kernel
-from tolcontact.geometry.candidates import facing_planes, moot_corners, sorted_candidates
+from tolcontact.geometry.facing_planes import facing_planes, moot_corners
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER, TINY
 from tolcontact.geometry.places import PLAIN, Look, Places
 from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
+from tolcontact.geometry.sorted_candidates import sorted_candidates
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.triangle_mesh import blocks, overlaps
 

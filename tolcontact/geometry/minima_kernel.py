@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from tolcontact.compiled import compiled, inner
-from tolcontact.geometry.plane_kernel import coordinates, gap_at, write_map
+from tolcontact.geometry.height_kernel import coordinates, gap_at, write_map
 
 MAX_STEPS = 10  # per local search
 STEP_SHARE = 1e-2  # of the reach: a smaller step ends the search

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled, inlined_uncounted, uncounted
+from tolcontact.geometry.choice_kernel import choose, drop_beyond_ridges, is_near, keep_shallowest, least
 from tolcontact.geometry.kernel import (
     CORNER_ON_FACET,
     EDGE_ON_EDGE,
@@ -15,16 +16,11 @@ from tolcontact.geometry.kernel import (
     MAX_TILT_SINE,
     NOWHERE,
     TINY,
-    choose,
     corner_on_facet,
-    drop_beyond_ridges,
-    drop_passed,
     edge_on_edge,
     facet_on_corner,
-    is_near,
-    keep_shallowest,
-    least,
 )
+from tolcontact.geometry.passed_kernel import drop_passed
 from tolcontact.geometry.vector_kernel import cross, dot, first_from, is_within, minus, move, move_back, row, row_of, turn
 
 LEVEL = MAX_TILT_SINE - 2 * IN_PLANE  # sine of the angle between planes: edges in one of them rise no further above the other

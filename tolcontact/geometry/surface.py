@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 from trimesh.triangles import points_to_barycentric
 
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, axes_across
-from tolcontact.geometry.plane_kernel import Region
+from tolcontact.geometry.region_kernel import Region
 from tolcontact.geometry.tolerances import SAME_DIRECTION, SAME_PLACE
 from tolcontact.geometry.triangle_mesh import CREASE, on_rim, oriented, placed_mesh, rim, triangle_tree
 

@@ -8,7 +8,7 @@ import igl
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.interference import depth_kernel, free_kernel, kernel, parting_kernel
+from tolcontact.interference import depth_kernel, free_kernel, kernel, near_kernel, parting_kernel
 from tolcontact.interference.free_region import CORNERS, free_region
 from tolcontact.interference.kernel import LEAF
 from tolcontact.interference.solid import Solid
@@ -175,7 +175,7 @@ def _side(body: Solid, round_faces: np.ndarray, target: Solid, round_faces_of_ta
     vertices, corners = body.vertices, body.corners
     tree, tree_of_target = box_tree(corners), box_tree(target.corners)
     ends, distances = vertices[body.edges], np.empty(len(body.edges))
-    depth_kernel.distances(ends.min(axis=1), ends.max(axis=1), tree_of_target.boxes, tree_of_target.next, distances)
+    near_kernel.distances(ends.min(axis=1), ends.max(axis=1), tree_of_target.boxes, tree_of_target.next, distances)
     order = np.argsort(distances, kind="stable")
     squares, _, _ = igl.point_mesh_squared_distance(vertices, target.vertices, target.faces)
     witnesses = np.array([rows[np.argmax(squares[rows])] for rows in body.components])
@@ -228,9 +228,9 @@ def _near_facets(
     boxes = np.ascontiguousarray(ends.min(axis=1)), np.ascontiguousarray(ends.max(axis=1))
     around = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
     starts, listed, reaches = np.zeros(len(ends) + 1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
-    depth_kernel.near_facets(*boxes, tree, around, target.facet_of, reach, False, starts, listed, reaches)
+    near_kernel.near_facets(*boxes, tree, around, target.facet_of, reach, False, starts, listed, reaches)
     listed, reaches = np.empty(starts[-1], dtype=np.int64), np.empty(starts[-1])
-    depth_kernel.near_facets(*boxes, tree, around, target.facet_of, reach, True, starts, listed, reaches)
+    near_kernel.near_facets(*boxes, tree, around, target.facet_of, reach, True, starts, listed, reaches)
     edge = np.repeat(np.arange(len(ends)), np.diff(starts))
     kept = (round_edges[edge] < 0) | (round_edges[edge] != round_facets[listed])
     return np.cumsum([0, *np.bincount(edge[kept], minlength=len(ends))]), listed[kept], reaches[kept]

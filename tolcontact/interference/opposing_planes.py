@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.arrays import Array, Float, Int
-from tolcontact.geometry.inset import displacements
+from tolcontact.geometry.vertex_displacements import displacements
 
 MIN_SINGULAR = 0.05  # of the planes around a vertex: directions with a smaller singular value are left alone
 OPPOSED = 0.1  # of the motion of the planes: a vertex that lies further from one of them has to be divided

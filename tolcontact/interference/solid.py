@@ -11,10 +11,11 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cylinder, Plane
 from tolcontact.geometry.brep_face import known_surfaces
-from tolcontact.geometry.inset import SAME_PLANE, capped, displacements, smaller
+from tolcontact.geometry.inset import smaller
 from tolcontact.geometry.polyhedron import merged_surface
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.triangle_mesh import coordinate_error, edges
+from tolcontact.geometry.vertex_displacements import SAME_PLANE, capped, displacements
 from tolcontact.interference.opposing_planes import MIN_SINGULAR, divided
 from tolcontact.vocabulary import ROUNDED
 
@@ -119,7 +120,12 @@ class Solid:
         motions = (-depths[:, None] * self.normals)[:, None].repeat(3, axis=1)
         shifts = self._shifts(np.arange(len(self.faces)), motions[..., None])[..., 0]
         vertices = self.vertices + capped(shifts, MAX_SHIFT * float(depths.max(initial=0.0)))
-        return replace(self, vertices=np.ascontiguousarray(vertices))
+        inset = replace(self, vertices=np.ascontiguousarray(vertices))
+        # These properties do not depend on where vertices are: they are found once for a part, not for each of its neighbours.
+        inset.__dict__.update(
+            components=self.components, moves=self.moves, facet_of=self.facet_of, first_of_facet=self.first_of_facet
+        )
+        return inset
 
     def deviating(
         self,

@@ -3,7 +3,7 @@
 .. include:: ../guide/mechanics.md
 """
 
-from tolcontact.mechanics.correction import MOMENTS
+from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap import GapMap
 from tolcontact.mechanics.groups import Group, curved_pairs
 from tolcontact.mechanics.pose import ENTRIES

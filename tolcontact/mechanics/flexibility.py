@@ -18,33 +18,18 @@ from scipy import linalg, sparse
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.compiled import compiled
 from tolcontact.declaration import Mesh, Part, Point
 from tolcontact.discretization import Nominal, NominalPart, Weld
 from tolcontact.elasticity import ElasticBody, imported_body, meshed_body, responses
 from tolcontact.errors import Faults, GeometryFault, designation
 from tolcontact.geometry.files import FROM_PRODUCT
 from tolcontact.mechanics.groups import Group, Load
+from tolcontact.mechanics.opening_kernel import add_openings
 
 NULL = 1e-14  # of the largest eigenvalue of C, scaled to a unit diagonal: smaller ones are rounding
 SAME = 1e-12  # of the largest eigenvalue: of fewer motions at two-sided locators than there are locators
 
 Bodies = Mapping[Part, ElasticBody]
-
-
-@compiled
-def _add_openings(C, reactions, openings):  # type: ignore[no-untyped-def]
-    """Add C l to the openings (realization, row) [mm], with C (row, row) [mm/N], for reactions l (realization, row) [N].
-
-    Sums run over the rows under load in their order, so that a realization does not depend on the others. The function calls
-    no other compiled one, so that Numba notices every change (see tolcontact.compiled).
-    """
-    for k in range(len(reactions)):
-        for row in range(len(C)):
-            load = reactions[k, row]
-            if load != 0.0:
-                for i in range(len(C)):
-                    openings[k, i] += load * C[row, i]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +72,7 @@ class Flexibility:
         return self._opened(np.zeros(reactions.shape), reactions)
 
     def _opened(self, openings: np.ndarray, reactions: np.ndarray) -> np.ndarray:
-        _add_openings(self.C, np.ascontiguousarray(reactions), openings)
+        add_openings(self.C, np.ascontiguousarray(reactions), openings)
         return openings
 
 

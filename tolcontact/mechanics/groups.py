@@ -7,7 +7,8 @@ import numpy as np
 
 from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.discretization import ContactPoints, Nominal
-from tolcontact.mechanics.correction import Mobility, moment_table
+from tolcontact.mechanics.correction import Mobility
+from tolcontact.mechanics.displacement import moment_table
 from tolcontact.mechanics.pose import Number, Vector
 from tolcontact.method import Method
 

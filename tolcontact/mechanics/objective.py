@@ -10,7 +10,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from tolcontact.mechanics.correction import MOMENTS, displacement_energy, moments_about
+from tolcontact.mechanics.displacement import MOMENTS, displacement_energy, moments_about
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.groups import Group, Side
 from tolcontact.mechanics.placement import elongation

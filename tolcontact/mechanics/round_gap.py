@@ -1,16 +1,12 @@
-"""Gaps of round faces at any pose: of the centre of a ball, or the axis ends of a shaft, against a wall.
-
-A class of contact points (see discretization) has a class of gaps, in a file of its own; KINDS is the table of them.
-"""
+"""Gaps of round faces at any pose: of the centre of a ball, or the axis ends of a shaft, against a wall."""
 
 import functools
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
 
-from tolcontact.discretization import ContactPoints, RoundContact, RoundPoint, RoundPoints
+from tolcontact.discretization import RoundContact, RoundPoint, RoundPoints
 from tolcontact.mechanics.gap import FixedGaps, GapMap, GapTerms, Point, RowPoints
 from tolcontact.mechanics.group_equations import face_heights
 from tolcontact.mechanics.pose import ENTRIES, Pose, congruent, pose_of
@@ -97,14 +93,6 @@ class RoundGaps(FixedGaps):
 
     def _at(self, X_RM: ca.SX, heights: ca.SX) -> GapTerms:
         return round_gaps(self._round, X_RM, heights, ca.SX(len(self._round), 1), ca.SX(ENTRIES, 0))
-
-
-KINDS: dict[type[ContactPoints], Callable[[Any], FixedGaps]] = {ContactPoints: FixedGaps, RoundContact: RoundGaps}
-
-
-def pair_gaps(pair: ContactPoints) -> FixedGaps:
-    """Return the equations of a pair's kind of contact."""
-    return KINDS[type(pair)](pair)
 
 
 class _Body:

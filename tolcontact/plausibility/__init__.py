@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 from tolcontact.compilation import Program
 from tolcontact.errors import NominalWarning
-from tolcontact.plausibility import bodies, declared_points, effects, elastic_checks, measures, pairs
+from tolcontact.plausibility import bodies, declared_points, effects, elastic_checks, faces, measures, pairs, scale
 from tolcontact.plausibility.drawing import drawing_remarks
 from tolcontact.plausibility.elastic_checks import elastic_remarks
 from tolcontact.plausibility.trial_draws import TrialDraws
@@ -17,8 +17,8 @@ from tolcontact.texts import shown
 __all__ = ["KINDS", "drawing_remarks", "elastic_remarks", "warn_of_nominal"]
 
 KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
-    "units": (declared_points.doubtful_units, declared_points.out_of_scale),
-    "face": (effects.partial_surfaces,),
+    "units": (declared_points.doubtful_units, scale.out_of_scale),
+    "face": (faces.partial_surfaces,),
     "coarse": (pairs.coarse_pairs, declared_points.stored_coordinates),
     "angle": (measures.rotations,),
     "point": (declared_points.far_points,),
@@ -34,7 +34,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "reach": (measures.measured_reach,),
     "force": (pairs.unused_forces,),
     "friction": (pairs.unsure_seats,),
-    "form": (effects.measured_forms,),
+    "form": (faces.measured_forms,),
     "bending": (elastic_checks.large_bending, elastic_checks.unresolved_nominal),
     "effect": (effects.unfollowed_by_measures, effects.unfollowed_by_locators, effects.unused_features, effects.unvaried),
 }

@@ -14,9 +14,9 @@ from tolcontact.declaration.values import DIRECTIONS, direction
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.features.feature_geometry import CylinderFeature
 from tolcontact.geometry.analytic_surfaces import Plane
+from tolcontact.geometry.body_overlap import SolidBody, common_ball
 from tolcontact.geometry.brep_face import number_faces
 from tolcontact.geometry.files import BREP
-from tolcontact.geometry.nearest_elements import SolidBody, common_ball
 from tolcontact.interference import Clash, Interference, Watch
 from tolcontact.plausibility.trial_draws import TrialDraws
 from tolcontact.vocabulary import CORRECTED, Status

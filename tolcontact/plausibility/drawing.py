@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +20,19 @@ ADVICE = {
 }  # fmt: skip
 
 
-# A sentence, and the part, noun and name of what it is on; without a part, it is on all drawings.
-Remark = tuple[str, str, str, str]
+class Remark(NamedTuple):
+    """A remark on the drawing of a part; without a part, on all drawings.
+
+    text   a sentence
+    part   the name of the part
+    noun   the kind of what the remark is on: "feature", "pattern" or "datum"
+    name   the name of the feature or pattern, or the letter of the datum
+    """
+
+    text: str
+    part: str = ""
+    noun: str = ""
+    name: str = ""
 
 
 def drawing_remarks(nominal: Nominal) -> Iterator[str]:
@@ -77,7 +89,7 @@ def perfect_datums(nominal: Nominal) -> Iterator[Remark]:
             and isinstance(pattern.geometries[0], PlaneFeature) and not isinstance(pattern.geometries[0], FeatureOfSize)
         ]  # fmt: skip
         if flat:
-            yield "no tolerance of form: taken as flat; add tc.Flatness", part.name, "datum", _listed(flat)
+            yield Remark("no tolerance of form: taken as flat; add tc.Flatness", part.name, "datum", _listed(flat))
 
 
 def unused_datums(nominal: Nominal) -> Iterator[Remark]:
@@ -87,7 +99,7 @@ def unused_datums(nominal: Nominal) -> Iterator[Remark]:
         letters = [declared.datum for declared in part.part.toleranced if declared.datum]
         letters += [targets.letter for targets in part.part.targets]
         if idle := [letter for letter in letters if letter not in used]:
-            yield "no tolerance refers to it; refer to it, or leave the letter out", part.name, "datum", _listed(idle)
+            yield Remark("no tolerance refers to it; refer to it, or leave the letter out", part.name, "datum", _listed(idle))
 
 
 def ineffective_tolerances(nominal: Nominal) -> Iterator[Remark]:
@@ -111,7 +123,7 @@ def perfect_faces(nominal: Nominal) -> Iterator[Remark]:
     if perfect:
         faces = [f"{part} ({_listed(list(dict.fromkeys(pairs)))})" for part, pairs in perfect.items()]
         touched = f"no tolerance touches the faces in contact of {_listed(faces)}: taken as perfect"
-        yield f"{touched}; if this is not meant, declare them as features with tolerances", "", "", ""
+        yield Remark(f"{touched}; if this is not meant, declare them as features with tolerances")
 
 
 def _moot_modifiers(nominal: Nominal, pattern: NominalPattern, tolerance: GeometricTolerance) -> Iterator[str]:
@@ -169,7 +181,7 @@ def _letter(pattern: NominalPattern) -> str | None:
 
 def _remark(pattern: NominalPattern, text: str) -> Remark:
     declared = pattern.declared
-    return text, declared.part.name, declared.noun, declared.designation.removeprefix(f"{declared.noun} ")
+    return Remark(text, declared.part.name, declared.noun, declared.designation.removeprefix(f"{declared.noun} "))
 
 
 def _listed(names: Sequence[str]) -> str:

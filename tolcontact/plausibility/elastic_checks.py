@@ -11,7 +11,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import Program
-from tolcontact.compilation.program import STIFFER, overheld, stiffer, with_flexibility
+from tolcontact.compilation.other_flexibility import STIFFER, overheld, stiffer, with_flexibility
 from tolcontact.declaration import Measure
 from tolcontact.elasticity import ElasticBody
 from tolcontact.errors import GeometryFault, NominalWarning

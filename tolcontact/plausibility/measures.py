@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,26 +48,36 @@ def wide_tolerances(draws: TrialDraws) -> Iterator[str]:
             continue
         place = location_designation(draws.program.nominal, nominal)
         zones = list(_zones(nominal, place))
-        owner, width, phrase, largest, _ = max(zones, key=lambda zone: zone[1] / zone[3], default=NO_ZONE)
-        if width > largest:
+        widest = max(zones, key=lambda zone: zone.width / zone.largest, default=None)
+        narrowest = min(zones, key=lambda zone: zone.width / zone.smallest, default=None)
+        if widest is not None and widest.width > widest.largest:
             yield (
-                f"{owner}: its tolerance of {width:.4g} mm is wide compared with {phrase}; a tolerance is the full width of "
-                "its zone, in mm"
+                f"{widest.owner}: its tolerance of {widest.width:.4g} mm is wide compared with {widest.extent_in_words}; a "
+                "tolerance is the full width of its zone, in mm"
             )
-            continue
-        owner, width, phrase, _, smallest = min(zones, key=lambda zone: zone[1] / zone[4], default=NO_ZONE)
-        if width < smallest:
+        elif narrowest is not None and narrowest.width < narrowest.smallest:
             yield (
-                f"{owner}: its tolerance of {width:.4g} mm is narrower than the finest standard grade for {phrase}; tolerances "
-                "are in mm, not in metres"
+                f"{narrowest.owner}: its tolerance of {narrowest.width:.4g} mm is narrower than the finest standard grade for "
+                f"{narrowest.extent_in_words}; tolerances are in mm, not in metres"
             )
         elif len(nominal.locators):
             yield from islice(_weak_locators(nominal, place), 1)
 
 
-# The owner of a zone in a message, its width [mm], what it is compared with in words, and its largest and smallest width [mm].
-Zone = tuple[str, float, str, float, float]
-NO_ZONE: Zone = ("", 1.0, "", 1.0, 1.0)
+class Zone(NamedTuple):
+    """A declared zone.
+
+    owner              how a message names it
+    width              [mm]
+    extent_in_words    the length that it is compared with
+    largest, smallest  plausible widths [mm]
+    """
+
+    owner: str
+    width: float
+    extent_in_words: str
+    largest: float
+    smallest: float
 
 
 def _zones(nominal: NominalPart, place: str) -> Iterator[Zone]:
@@ -76,7 +87,7 @@ def _zones(nominal: NominalPart, place: str) -> Iterator[Zone]:
     for label, tolerance in zip(nominal.locators.labels, nominal.locators.tolerances, strict=True):
         if tolerance.range and tolerance.width > CONSTANT_SHARE * extent:
             owner = f'{place}: locator "{label.rpartition(".")[2]}"'
-            yield owner, tolerance.width, part, WIDE_SHARE * extent, grade_width(FINEST, extent)
+            yield Zone(owner, tolerance.width, part, WIDE_SHARE * extent, grade_width(FINEST, extent))
     for declared in nominal.part.toleranced:
         for control in declared.tolerances:
             if isinstance(control, Size):
@@ -86,7 +97,7 @@ def _zones(nominal: NominalPart, place: str) -> Iterator[Zone]:
             if is_length(width) and width > CONSTANT_SHARE * extent:
                 owner = f'part "{nominal.name}": {declared.designation}: {control.kind}'
                 largest = min(grade_width(COARSEST, length), WIDE_SHARE * length)
-                yield owner, float(width), phrase, largest, grade_width(FINEST, length)
+                yield Zone(owner, float(width), phrase, largest, grade_width(FINEST, length))
 
 
 def _weak_locators(nominal: NominalPart, place: str) -> Iterator[str]:

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from tolcontact import poses as pose
 from tolcontact.declaration import ContactPair, Face, Inside, Part
 from tolcontact.discretization import ContactPoints, Nominal
-from tolcontact.geometry.spreading import CHORD_SHARE
-from tolcontact.mechanics.correction import central_moments, moments_about
+from tolcontact.geometry.curvature import CHORD_SHARE
+from tolcontact.mechanics.displacement import central_moments, moments_about
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
 from tolcontact.statics import TouchingPoints, balances, contacts_at, drawn_contacts
 

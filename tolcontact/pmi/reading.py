@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from tolcontact.errors import OptionError
+from tolcontact.input_files import fault_of
 from tolcontact.pmi.annotations import Dimension, Pmi, Tolerance
 from tolcontact.pmi.aspects import DATUM_SIZE, LOCATIONS, SIZES, Aspects, datum_system, datums_of, features_of
 from tolcontact.pmi.part21 import Quantity, Records, length, quantity
-from tolcontact.tables import fault_of
 from tolcontact.texts import clipped
 
 MAX_SIZE = 2_000_000_000  # [byte]; reading takes several times as much memory
@@ -120,13 +120,13 @@ def _tolerance(records: Records, aspects: Aspects, record: int, **stated: Any) -
     """Return a tolerance, with what other records have `stated` of it."""
     entities, parameters = records.entities(record), records.parameters(record, _BASE, *KINDS)
     aspect = parameters.reference(3)
-    unit, area, modifiers, earlier, maximum, unequal, system = (
-        records.parameters(record, entity)
-        for entity in (
-            f"{_WITH}DEFINED_UNIT", f"{_WITH}DEFINED_AREA_UNIT", f"{_WITH}MODIFIERS", f"MODIFIED_{_BASE}",
-            f"{_WITH}MAXIMUM_TOLERANCE", f"UNEQUALLY_DISPOSED_{_BASE}", f"{_WITH}DATUM_REFERENCE",
-        )
-    )  # fmt: skip
+    unit = records.parameters(record, f"{_WITH}DEFINED_UNIT")
+    area = records.parameters(record, f"{_WITH}DEFINED_AREA_UNIT")
+    modifiers = records.parameters(record, f"{_WITH}MODIFIERS")
+    earlier = records.parameters(record, f"MODIFIED_{_BASE}")  # a single modifier, in older files
+    maximum = records.parameters(record, f"{_WITH}MAXIMUM_TOLERANCE")
+    unequal = records.parameters(record, f"UNEQUALLY_DISPOSED_{_BASE}")
+    system = records.parameters(record, f"{_WITH}DATUM_REFERENCE")
     sides = [length(records, number) for number in (unit.reference(0), area.reference(1))]
     faces, others = aspects.items(aspect)
     return Tolerance(
@@ -134,7 +134,6 @@ def _tolerance(records: Records, aspects: Aspects, record: int, **stated: Any) -
         kind=next((kind for entity, kind in KINDS.items() if entity in entities), ""),
         name=parameters.text(0),
         value=length(records, parameters.reference(2)),
-        # A set of modifiers, or a single one in older files.
         modifiers=tuple(dict.fromkeys([*modifiers.words(0), *earlier.words(max(len(earlier) - 1, 0))])),
         per_unit=tuple(side for side in sides if side is not None),
         unit_shape=next(iter(area.words(0)), ""),

@@ -11,9 +11,8 @@ from rich.text import Text
 
 from tolcontact import vocabulary as terms
 from tolcontact.limits import GAP_ACCURACY
-from tolcontact.report import stack_tables
-from tolcontact.report.stack_tables import lost_realizations, unresolved
-from tolcontact.report.table import AnalysisReport, Table, by_measure, grouped, number, percent
+from tolcontact.report import allocation_tables, stack_tables
+from tolcontact.report.table import AnalysisReport, Table, by_measure, grouped, lost_realizations, number, percent, unresolved
 
 BRIEF_TABLES, BRIEF_ROWS = 10, 4  # of a coarse answer in brief: the first tables, and the rows of each that a line has
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
@@ -244,8 +243,8 @@ _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
     terms.SENSITIVITIES.name: _sensitivities,
     terms.WORST_CASE.name: _worst_case,
     terms.TAILS.name: _tails,
-    terms.ALLOCATION.name: stack_tables.allocation_report,
-    terms.RELOCATION.name: stack_tables.relocation_report,
+    terms.ALLOCATION.name: allocation_tables.allocation_report,
+    terms.RELOCATION.name: allocation_tables.relocation_report,
     terms.SEATING.name: _seating,
     terms.SWEEP.name: stack_tables.sweep_report,
 }

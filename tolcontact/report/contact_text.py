@@ -180,15 +180,13 @@ def _clashes(summary: xr.Dataset, count: int, *, is_long: bool = False) -> Itera
         yield f"bodies were not tested for interference {reason}: certificates hold for contact points"
         return
     if share[0] > 0:
-        clashes, extent = (
-            _clashes_of(summary, is_declared=False),
-            f"{percent(share)} of realizations; verdicts do not hold there",
-        )
+        clashes = _clashes_of(summary, is_declared=False)
         if is_long:  # the verdicts state the share
             rest = [f"{len(clashes) - MOST_CLASHES} more"] if len(clashes) > MOST_CLASHES else []
-            extent = ", ".join(clashes[:MOST_CLASHES] + rest)
-        yield f"parts without declared contact lie in each other: {extent}"
-        if not is_long:
+            yield f"parts without declared contact lie in each other: {', '.join(clashes[:MOST_CLASHES] + rest)}"
+        else:
+            text = f"{percent(share)} of realizations; verdicts do not hold there"
+            yield f"parts without declared contact lie in each other: {text}"
             yield f"these parts, where they lie deepest: {', '.join(clashes)}"
         yield "advice: declare their contact, or that it is meant: assembly.may_overlap(...); tolcontact check writes the lines"
     if is_long:

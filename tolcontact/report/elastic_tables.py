@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import xarray as xr
@@ -17,8 +18,14 @@ MAX_ROWS = 10_000  # realizations whose reactions are shown
 NO_LOAD, ROUNDING = 1e-4, 1e-9  # of the largest reaction of all: contact that transmits less is open; smaller ones are zero
 
 
-# Values with rigid parts (realization, measure), and how these are placed in words.
-RigidMeasured = tuple[Float[Array, "realization measure"], str]
+class RigidMeasured(Protocol):
+    """Values with rigid parts (realization, measure), and how these are placed in words."""
+
+    @property
+    def measured(self) -> Float[Array, "realization measure"]: ...
+
+    @property
+    def words(self) -> str: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,16 +123,15 @@ def variance_table(results: xr.DataTree, rigid: Callable[[], RigidMeasured | Non
         values = None
     if values is None:
         return None
-    rigid_measured, words = values
-    rows = results.to_dataset().isel({terms.REALIZATION: slice(len(rigid_measured))})
-    is_kept = is_assembled(rows[terms.STATUS.name].values) & np.isfinite(rigid_measured).all(axis=1)
+    rows = results.to_dataset().isel({terms.REALIZATION: slice(len(values.measured))})
+    is_kept = is_assembled(rows[terms.STATUS.name].values) & np.isfinite(values.measured).all(axis=1)
     measured = rows[terms.MEASURED.name].values[is_kept, terms.CORRECTED]
     table = []
     for k, measure in enumerate(rows[terms.MEASURE].values):
-        ratio = variance_ratio(rigid_measured[is_kept, k], measured[:, k])
+        ratio = variance_ratio(values.measured[is_kept, k], measured[:, k])
         table.append([str(measure), percent((1 - ratio.value, 1 - ratio.upper, 1 - ratio.lower))])
     remark = (
-        f"1 - V / W: W is the variance with contact, V that of {words}; {int(is_kept.sum())} realizations. "
+        f"1 - V / W: W is the variance with contact, V that of {values.words}; {int(is_kept.sum())} realizations. "
         "Negative: bending evens deviations out."
     )
     return Table("Variance that elasticity adds", ["measurement", "share of variance"], table, [remark])

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -23,11 +23,19 @@ COLUMNS = (
 SIDES = ("below", "above")
 
 
+class StateFigures(NamedTuple):
+    """The figures of a measurement in one state, as (estimate, lower, upper) of `STATISTICS`, and as texts."""
+
+    state: str
+    values: np.ndarray
+    cells: list[str]
+
+
 class ResultRow(NamedTuple):
     """The rows of the table for a measurement.
 
     verdict   "" without limits
-    states    with contact first: the state in words, figures (estimate, lower, upper) of `STATISTICS`, and their texts, `cells`
+    states    with contact first
     """
 
     name: str
@@ -39,7 +47,7 @@ class ResultRow(NamedTuple):
     lower: float
     upper: float
     limits: tuple[str, str, str]
-    states: list[dict[str, Any]]
+    states: list[StateFigures]
 
 
 def share_units(summary: xr.Dataset) -> str:
@@ -88,10 +96,10 @@ def result_rows(summary: xr.Dataset) -> list[ResultRow]:
     return rows
 
 
-def _state_figures(of_state: xr.Dataset, units: str) -> dict[str, Any]:
+def _state_figures(of_state: xr.Dataset, units: str) -> StateFigures:
     values = of_state["statistic_value"].sel(statistic=list(STATISTICS)).transpose("statistic", "interval").values
     cells = [*map(number, values[:3]), *(share_in(share, units) for share in values[3:])]
-    return {"state": terms.WORD_OF_STATE[str(of_state["state"].values)], "figures": values, "cells": cells}
+    return StateFigures(terms.WORD_OF_STATE[str(of_state["state"].values)], values, cells)
 
 
 def verdict_of(measure: xr.Dataset, realizations: int) -> Verdict | None:

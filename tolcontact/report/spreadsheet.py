@@ -87,7 +87,7 @@ def _document(results: xr.DataTree, summary: xr.Dataset, titles: TitleBlock) -> 
 def _results(summary: xr.Dataset) -> Table:
     heads = [f"{name}{end}" for name in (*STATISTICS[:3], "share below limit", "share above limit") for end in INTERVAL]
     rows = [
-        [*row[:4], row.nominal, row.lower, row.upper, state["state"], *state["figures"].ravel()]
+        [*row[:4], row.nominal, row.lower, row.upper, state.state, *state.values.ravel()]
         for row in result_rows(summary)
         for state in row.states
     ]

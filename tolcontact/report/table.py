@@ -12,6 +12,7 @@ from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
+from tolcontact import vocabulary as terms
 from tolcontact.limits import GAP_ACCURACY
 
 Cell = str | float | None  # None is an empty cell
@@ -113,6 +114,16 @@ class AnalysisReport:
 def by_measure(dataset: xr.Dataset) -> list[xr.Dataset]:
     """Return the part of a dataset for each measure."""
     return [dataset.sel(measure=name) for name in dataset["measure"].values]
+
+
+def lost_realizations(count: int) -> list[str]:
+    """Return a remark on realizations that were not resolved; none without any."""
+    return [f"{grouped(count)} realizations were not resolved; their last poses are included"] if count else []
+
+
+def unresolved(dataset: xr.Dataset) -> int:
+    """Return the number of realizations that were not resolved."""
+    return int(dataset["by_status"].values[list(terms.UNRESOLVED)].sum())
 
 
 def grouped(count: int) -> str:

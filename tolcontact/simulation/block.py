@@ -14,7 +14,8 @@ from tolcontact.contact.record import Record, join_groups, untouched_numbers
 from tolcontact.contact.state import Outcome
 from tolcontact.mechanics import ENTRIES
 from tolcontact.readable import Readable
-from tolcontact.simulation.bodies import locator_offsets, watched_bodies
+from tolcontact.simulation.bodies import watched_bodies
+from tolcontact.simulation.locator_offsets import locator_offsets
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 
@@ -182,7 +183,7 @@ def simulate_block(
 def _watch(program: Program, block: Block, resolvers: list[ContactResolver], outcomes_by_stage: Int[Array, "n stage"]) -> None:
     """Write the bodies that interfere into a block, and withdraw the certificates that they refute."""
     worst = outcomes_by_stage.max(axis=1)
-    clashes, withdrawn = watched_bodies(
+    bodies = watched_bodies(
         program,
         block.poses[:, CORRECTED],
         block.deviations,
@@ -191,9 +192,9 @@ def _watch(program: Program, block: Block, resolvers: list[ContactResolver], out
         is_doubtful=worst == Outcome.DOUBTFUL,
         is_certified=worst <= Outcome.RESOLVED,
     )
-    for name, values in clashes.items():
-        getattr(block, name)[:] = values
-    for index, rows in withdrawn:
+    block.clashes[:], block.clash_depth[:] = bodies.clashes, bodies.depth
+    block.clash_part[:], block.clash_other[:] = bodies.part, bodies.other
+    for index, rows in bodies.withdrawn:
         of_stage = outcomes_by_stage[:, index]
         of_stage[rows] = np.where(of_stage[rows] <= Outcome.RESOLVED, Outcome.DOUBTFUL, of_stage[rows])
 

@@ -1,21 +1,44 @@
-"""Bodies of a block that lie in each other, and how far contact moves parts off their rigid two-sided locators.
-
-The watch over all bodies withdraws certificates of penetrating pairs, and counts other clashes.
-"""
+"""The watch over all bodies of a block: it withdraws certificates of penetrating pairs, and counts other clashes."""
 
 from collections.abc import Collection
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from tolcontact import poses as pose
-from tolcontact.arrays import Array, Bool, Float
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import Program
-from tolcontact.discretization import Nominal
 from tolcontact.interference import Clash
-from tolcontact.vocabulary import CORRECTED, RAW
 
 MAX_TRIANGLES = 1000  # of two bodies: with more, measuring their depth takes milliseconds
 MEASURED_STEP = 16  # realizations: the depth of bodies with more triangles is measured in every 16th realization
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedBodies:
+    """Bodies that lie in each other, in n realizations.
+
+    withdrawn   stations, and the rows (k,) where bodies with declared contact at the station lie in each other
+    clashes     (n,) number of pairs of parts without declared contact that lie in each other
+    depth       (n,) [mm]: penetration of the deepest of these pairs; 0 for none, NaN if it is not measured
+    part, other (n,) indices of the parts of this pair in the assembly; -1 for none
+    """
+
+    clashes: Int[Array, " n"]
+    depth: Float[Array, " n"]
+    part: Int[Array, " n"]
+    other: Int[Array, " n"]
+    withdrawn: list[tuple[int, np.ndarray]] = field(default_factory=list)
+
+    @classmethod
+    def none(cls, count: int) -> "WatchedBodies":
+        """Return `count` realizations without bodies that lie in each other."""
+        return cls(np.zeros(count, dtype=int), np.zeros(count), np.full(count, -1), np.full(count, -1))
+
+    def name(self, rows: Int[Array, " k"], depths: Float[Array, " k"], parts: tuple[int, int]) -> None:
+        """Record two parts, with depths (k,) [mm], as the deepest pair in each of the rows (k,) where they are."""
+        is_deeper = (self.part[rows] < 0) | (np.nan_to_num(depths) > np.nan_to_num(self.depth[rows]))
+        deepest = rows[is_deeper]
+        self.depth[deepest], self.part[deepest], self.other[deepest] = depths[is_deeper], *parts
 
 
 def watched_bodies(
@@ -27,46 +50,36 @@ def watched_bodies(
     tested: Collection[tuple[int, int]],
     is_doubtful: Bool[Array, " n"],
     is_certified: Bool[Array, " n"],
-) -> tuple[dict[str, np.ndarray], list[tuple[int, np.ndarray]]]:
-    """Return the clashes, with their depths and parts, at poses (n, part, 12) of realizations `start` to `start + n`.
+) -> WatchedBodies:
+    """Return which bodies lie in each other at poses (n, part, 12) of realizations `start` to `start + n`.
 
-    They are fields of Block by name. Also return stations with the rows (k,) where bodies with declared contact at the station
-    lie in each other.
     Pairs of bodies that were already `tested` are skipped where answers are certified. A pair of parts counts once, even if it
     penetrates in several stations. Pairs that penetrate nominally do not count. If no pair counts, bodies with declared contact
     are named where the answer is doubtful, or becomes doubtful because of them.
     """
     watch, nominal, count = program.watch, program.nominal, len(poses)
-    clashes, depth, part, other = np.zeros(count, dtype=int), np.zeros(count), np.full(count, -1), np.full(count, -1)
-
-    def name_deepest(clash: Clash) -> None:
-        """Name two bodies in the rows where they are the deepest pair."""
-        rows, depths = clash.rows, _depths(program, clash, poses, deviations, start)
-        is_deeper = (part[rows] < 0) | (np.nan_to_num(depths) > np.nan_to_num(depth[rows]))
-        deepest = rows[is_deeper]
-        depth[deepest], part[deepest], other[deepest] = depths[is_deeper], *_parts(program, clash)
-
     stations = [scene.station for scene in nominal.scenes] or [""]
     counted = dict[tuple[int, int], np.ndarray]()
-    withdrawn, declared = list[tuple[int, np.ndarray]](), list[Clash]()
+    bodies, declared = WatchedBodies.none(count), list[Clash]()
     for clash in watch.clashes(poses, deviations, left_out={*tested, *watch.overlapping}):
-        rows = clash.rows
+        rows, parts = clash.rows, _parts(program, clash)
         if clash.pair in watch.declared:
-            withdrawn.append((stations.index(nominal.parts[clash.pair[0]].station), rows))
+            bodies.withdrawn.append((stations.index(nominal.parts[clash.pair[0]].station), rows))
             declared.append(clash)
         else:
-            is_counted = counted.setdefault(_parts(program, clash), np.zeros(count, dtype=bool))
-            clashes[rows] += ~is_counted[rows]
+            is_counted = counted.setdefault(parts, np.zeros(count, dtype=bool))
+            bodies.clashes[rows] += ~is_counted[rows]
             is_counted[rows] = True
-            name_deepest(clash)
+            bodies.name(rows, _depths(program, clash, poses, deviations, start), parts)
     doubtful = np.flatnonzero(is_doubtful)
     if doubtful.size and tested:
         repeated = watch.clashes(poses[doubtful], deviations[doubtful], among=tested)
         declared += [Clash(clash.pair, doubtful[clash.rows]) for clash in repeated]
     for clash in declared:
-        is_named = (clashes[clash.rows] == 0) & (is_doubtful | is_certified)[clash.rows]
-        name_deepest(Clash(clash.pair, clash.rows[is_named]))
-    return {"clashes": clashes, "clash_depth": depth, "clash_part": part, "clash_other": other}, withdrawn
+        is_named = (bodies.clashes[clash.rows] == 0) & (is_doubtful | is_certified)[clash.rows]
+        named = Clash(clash.pair, clash.rows[is_named])
+        bodies.name(named.rows, _depths(program, named, poses, deviations, start), _parts(program, clash))
+    return bodies
 
 
 def _parts(program: Program, clash: Clash) -> tuple[int, int]:
@@ -88,37 +101,3 @@ def _depths(
     measured = Clash(clash.pair, clash.rows[is_measured])
     depths[is_measured] = program.watch.measured(measured, poses, deviations).depths
     return depths
-
-
-def locator_variations(program: Program) -> Float[Array, " part"]:
-    """Return the largest deviation [mm] of any rigid two-sided locator of each part; NaN for a part without one.
-
-    It is half the range of the locator, together with the ranges of the features that displace it.
-    """
-    nominal, ranges = program.nominal, np.array([contributor.range for contributor in program.draws.contributors])
-    largest = np.full(len(nominal.parts), np.nan)
-    for index, part in enumerate(nominal.parts):
-        columns = nominal.columns(index)
-        for locator in np.flatnonzero(part.locators.exact):
-            features, factors = part.locators.pushes(int(locator))
-            reach = (ranges[columns[locator]] + np.abs(factors) @ ranges[features]) / 2
-            largest[index] = np.fmax(largest[index], reach)
-    return largest
-
-
-def locator_offsets(nominal: Nominal, poses: Float[Array, "n state part 12"]) -> Float[Array, "n part"]:
-    """Return the largest distance [mm] by which contact moved each part along a rigid two-sided locator; 0 without one.
-
-    It is measured in the frame of the part that it is located on.
-    """
-    offsets = np.zeros((len(poses), len(nominal.parts)))
-    for index, part in enumerate(nominal.parts):
-        exact = np.flatnonzero(part.locators.exact) if part.movers else np.zeros(0, dtype=int)
-        owners = np.array(part.owners)[exact] if part.owners else np.full(len(exact), index)
-        for owner in np.unique(owners):
-            own = exact[owners == owner]
-            X = poses[:, :, owner] if part.parent is None else pose.relative(poses[:, :, owner], poses[:, :, part.parent])
-            moved = pose.apply(X[:, CORRECTED] - X[:, RAW], part.locators.points[own])  # which is linear in the pose
-            along = np.abs(np.einsum("nlx,lx->nl", moved, part.locators.directions[own]))
-            np.maximum(offsets[:, index], along.max(axis=1), out=offsets[:, index])
-    return offsets

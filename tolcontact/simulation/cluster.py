@@ -24,7 +24,6 @@ from tolcontact.simulation.packing import (
     MISSING_VERSION,
     Packed,
     check_version,
-    needs_dask,
     pack_model,
     prepare_worker,
     simulate_shard,
@@ -138,6 +137,15 @@ def running_cluster(address: str) -> Iterator[Any]:
             yield client
     finally:
         logger.setLevel(level)
+
+
+@contextmanager
+def needs_dask() -> Iterator[None]:
+    """Raise OptionError if dask is not installed."""
+    try:
+        yield
+    except ImportError as error:
+        raise OptionError("workers and lazy datasets need dask; install it with: pip install 'tolcontact[dask]'") from error
 
 
 def mapping(client: Any) -> MapBlocks:

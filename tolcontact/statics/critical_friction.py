@@ -2,8 +2,8 @@
 
 The force of contact point i is N_i n_i + t_i with N_i >= 0, t_i across n_i, |t_i| <= k m_i N_i, and its wrench W_i (N_i, t_i).
 A load w can be balanced if  sum W_i (N_i, t_i) + s w = 0  for some s > 0, scaled by sum N_i + s = 1. The largest s decides: if
-friction k balances the load, any larger one does, and the critical factor is found by bisection.
-Each is a second-order cone program for Clarabel.
+friction k balances the load, any larger one does, and the critical factor is found by bisection. Each step of the bisection
+solves a second-order cone program with Clarabel.
 """
 
 from collections.abc import Iterator, Sequence

@@ -168,7 +168,7 @@ def _sides(low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray
     with np.errstate(divide="ignore", invalid="ignore"):
         below = np.divide(np.subtract(median, limits.lower), _width(low, median, limits))
         above = np.divide(np.subtract(limits.upper, median), _width(median, high, limits))
-    return [index for limit, index in zip(limits, (below, above), strict=False) if np.isfinite(limit)]
+    return [index for limit, index in ((limits.lower, below), (limits.upper, above)) if np.isfinite(limit)]
 
 
 def _width(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np.ndarray:

@@ -13,17 +13,15 @@ from typing import Any
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.compiled import compiled
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.flexibility import PartFlexibility
 from tolcontact.realizations import is_assembled
-from tolcontact.statistics import intervals
+from tolcontact.statistics import intervals, kernel
 from tolcontact.vocabulary import CORRECTED, RAW, ArchiveVariable
 
 SHIFT_REALIZATIONS = 64  # their mean magnitude is close enough to the mean of all
 # "Some" realizations for magnitudes: more for parts with few points; the sums of all points take a tenth of a second.
 MAX_REALIZATIONS, MIN_REALIZATIONS, MAX_POINTS = 16_384, 1024, 1 << 25
-CHUNK_POINTS = 256  # per pass over the realizations
 
 
 def _magnitudes(fields: str, points: int) -> int:
@@ -165,24 +163,34 @@ class _Surface:
 
         loads   (n, load) of the model, if they bend the part
         """
-        sums = FieldSums(len(self) if count else 0, width=self.width)
+        sums, A = FieldSums(len(self) if count else 0, width=self.width), np.empty((len(poses), 3, 4))
         if not len(poses):
             return sums
-        A = np.zeros((len(poses), 3, self.width))  # coefficients of u: of the pose, the loads, and 1 for constant forces
-        affine_parts(poses, self._centre, A)
-        if loads is not None and self._loads is not None:
-            A[:, :, 4:-1], A[:, :, -1] = loads[:, None, self._loads], 1
-        add_scatter(A, sums.mean, sums.scatter)
+        kernel.affine_parts(poses, self._centre, A)
+        if self._loads is None:
+            kernel.add_scatter(A, sums.mean, sums.scatter)
+        else:
+            A = self._coefficients(A, loads)
+            kernel.add_wide_scatter(A, sums.mean, sums.scatter)
         sums.count[:] = len(A)
         if count:
             self._add_magnitudes(A[:count], sums)
         return sums
 
+    def _coefficients(self, A: np.ndarray, loads: np.ndarray | None) -> np.ndarray:
+        """Return the coefficients (n, 3, coefficient) of u: of the pose, the loads, and 1 for constant forces."""
+        assert self._loads is not None
+        wide = np.zeros((len(A), 3, self.width))
+        wide[:, :, :4] = A
+        if loads is not None:
+            wide[:, :, 4:-1], wide[:, :, -1] = loads[:, None, self._loads], 1
+        return wide
+
     def _add_powers(self, A: np.ndarray, shift: np.ndarray, powers: np.ndarray) -> None:
         if self._loads is None:
-            add_magnitudes(A, self._points, shift, powers)
+            kernel.add_magnitudes(A, self._points, shift, powers)
         else:
-            add_bent_magnitudes(A, np.ascontiguousarray(self._basis.transpose(0, 2, 1)), shift, powers)
+            kernel.add_bent_magnitudes(A, np.ascontiguousarray(self._basis.transpose(0, 2, 1)), shift, powers)
 
     def _add_magnitudes(self, A: np.ndarray, sums: FieldSums) -> None:
         # Powers are accumulated about a shift close to the mean, to avoid cancellation.
@@ -230,87 +238,3 @@ class _Surface:
         if not sums.count:
             mean, sigma = np.full_like(mean, np.nan), np.full_like(sigma, np.nan)
         return mean, np.column_stack([6 * sigma, magnitude_six_sigma]), np.column_stack([lower, upper])
-
-
-# The innermost loops, compiled: sums over realizations, in their order.
-
-
-@compiled
-def affine_parts(poses, centre, A):  # type: ignore[no-untyped-def]
-    """Write the first four columns of A (n, 3, w), for displacements u = A (x - centre, 1) of points x at poses (n, 12).
-
-    Rotation about the part's centre avoids cancellation in the sums.
-    """
-    for k in range(A.shape[0]):
-        for i in range(3):
-            A[k, i, 3] = poses[k, 9 + i]
-            for j in range(3):
-                A[k, i, j] = poses[k, 3 * i + j] - (1.0 if i == j else 0.0)
-                A[k, i, 3] += A[k, i, j] * centre[j]
-
-
-@compiled
-def add_scatter(A, mean, scatter):  # type: ignore[no-untyped-def]
-    """Write the mean (3, w) of A (n, 3, w), and add the products of the rows' deviations from it to scatter (3, w, w)."""
-    n, _, width = A.shape
-    difference = np.empty(width)
-    for i in range(3):
-        for p in range(width):
-            total = 0.0
-            for k in range(n):
-                total += A[k, i, p]
-            mean[i, p] = total / n
-        for k in range(n):
-            for p in range(width):
-                difference[p] = A[k, i, p] - mean[i, p]
-            for p in range(width):
-                value = difference[p]
-                if value != 0.0:
-                    for q in range(width):
-                        scatter[i, p, q] += value * difference[q]
-
-
-@compiled
-def add_bent_magnitudes(A, basis, shift, powers):  # type: ignore[no-untyped-def]
-    """Add powers as add_magnitudes does, for u = A . basis with A (n, 3, w) and basis (3, w, point)."""
-    u = np.empty((3, shift.size))
-    for k in range(A.shape[0]):
-        for i in range(3):
-            for v in range(shift.size):
-                u[i, v] = 0.0
-            for p in range(A.shape[2]):
-                value = A[k, i, p]
-                if value != 0.0:
-                    for v in range(shift.size):
-                        u[i, v] += value * basis[i, p, v]
-        for v in range(shift.size):
-            power1 = np.sqrt(u[0, v] ** 2 + u[1, v] ** 2 + u[2, v] ** 2) - shift[v]
-            power2 = power1 * power1
-            powers[0, v] += power1
-            powers[1, v] += power2
-            powers[2, v] += power2 * power1
-            powers[3, v] += power2 * power2
-
-
-@compiled
-def add_magnitudes(A, points, shift, powers):  # type: ignore[no-untyped-def]
-    """Add to powers (4, point) the first to fourth power of |u| - shift, realization after realization.
-
-    u = A @ (x, y, z, 1) for A (n, 3, 4), points (3, point), shift (point,).
-    """
-    for start in range(0, shift.size, CHUNK_POINTS):
-        stop = min(start + CHUNK_POINTS, shift.size)
-        x, y, z, offset = points[0, start:stop], points[1, start:stop], points[2, start:stop], shift[start:stop]
-        sum1, sum2, sum3, sum4 = powers[0, start:stop], powers[1, start:stop], powers[2, start:stop], powers[3, start:stop]
-        for k in range(A.shape[0]):
-            a, b, c = A[k, 0], A[k, 1], A[k, 2]
-            for v in range(x.size):
-                u = a[0] * x[v] + a[1] * y[v] + a[2] * z[v] + a[3]
-                w = b[0] * x[v] + b[1] * y[v] + b[2] * z[v] + b[3]
-                t = c[0] * x[v] + c[1] * y[v] + c[2] * z[v] + c[3]
-                power1 = np.sqrt(u * u + w * w + t * t) - offset[v]
-                power2 = power1 * power1
-                sum1[v] += power1
-                sum2[v] += power2
-                sum3[v] += power2 * power1
-                sum4[v] += power2 * power2

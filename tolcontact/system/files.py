@@ -1,15 +1,8 @@
-"""Files: opened without following links, replaced while others may have them open, removed while they are locked.
-
-Also the standard streams, and folders that no other user can write to: whoever can write to a cache of machine code can run
-code as its reader. On POSIX systems owners and modes tell who can. Windows has access lists instead, which Python does not
-read. By default they give other users no access to the user's profile folder, so there a folder is private if it lies in it.
-"""
+"""Files: opened without following links, replaced while others may have them open, removed while they are locked."""
 
 import errno
-import io
 import os
 import stat
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,17 +10,10 @@ from typing import BinaryIO
 
 import lazy_loader
 
-try:
-    import grp
-    import pwd
-except ImportError:  # on Windows
-    grp = pwd = None  # type: ignore[assignment]
-
 ctypes = lazy_loader.load("ctypes")  # on Windows
 IS_POSIX = hasattr(os, "geteuid")  # users with numbers, links for everyone, open files that can be replaced and removed
 # A link is not followed, and a pipe not waited for. Windows has neither flag, but it changes line ends unless told not to.
 _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
-_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _NO_FILE = 2  # the code of Windows for a file that does not exist
 _RETRY_SECONDS = (0.05, 0.1, 0.2, 0.4)  # a virus scanner or an indexer holds a new file open for a moment
 IN_USE = "it is open in another program, or as results in this one (results.close()); close it there, and try again"
@@ -146,64 +132,3 @@ def _refuse_link(path: Path) -> None:
     """Raise OSError for a link, where opening it cannot."""
     if not hasattr(os, "O_NOFOLLOW") and os.path.lexists(path) and is_link(path.lstat()):
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
-
-
-def is_private(folder: Path) -> bool:
-    """Return whether a path is a folder, and no link, of this user, that no other user (but root) can write to or replace.
-
-    Raises OSError if it does not exist.
-    """
-    status = folder.lstat()
-    if not stat.S_ISDIR(status.st_mode) or is_link(status) or not is_own(status):
-        return False
-    place = folder.parent.resolve().joinpath(folder.name)
-    if not IS_POSIX:
-        return place.is_relative_to(_profile())
-    return all(_is_safe(parent.stat()) for parent in place.parents)
-
-
-def is_own(status: os.stat_result) -> bool:
-    """Return whether a file or folder belongs to this user, and others cannot write to it; on Windows, its folder decides."""
-    return not IS_POSIX or (status.st_uid == os.geteuid() and not status.st_mode & _OTHERS)
-
-
-def _profile() -> Path:
-    """Return the user's profile folder."""
-    try:
-        return Path.home().resolve()
-    except RuntimeError as error:
-        raise OSError("this user has no profile folder") from error
-
-
-def _is_safe(status: os.stat_result) -> bool:
-    """Return whether others cannot rename what is in a folder and belongs to this user."""
-    if status.st_uid not in (0, os.geteuid()):
-        return False
-    writers = status.st_mode & _OTHERS
-    return not writers or bool(status.st_mode & stat.S_ISVTX) or (writers == stat.S_IWGRP and _is_own_group(status.st_gid))
-
-
-def _is_own_group(number: int) -> bool:
-    """Return whether a group is the one that many systems make for each user, with nobody else in it."""
-    try:
-        group, name = grp.getgrgid(number), pwd.getpwuid(os.geteuid()).pw_name
-    except KeyError:
-        return False
-    return group.gr_name == name and set(group.gr_mem) <= {name}
-
-
-def open_closed() -> None:
-    """Open a closed standard input, output or error as the null device: else the next file takes its number, and its output."""
-    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
-        os.set_inheritable(number, True)
-    os.close(number)
-    sys.stdin = sys.stdin or os.fdopen(0)
-    sys.stdout = sys.stdout or os.fdopen(1, "w")
-    sys.stderr = sys.stderr or os.fdopen(2, "w")
-
-
-def escape_unprintable() -> None:
-    """Print letters that the encoding of standard output and error lacks as escapes."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")

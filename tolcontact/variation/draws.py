@@ -12,6 +12,7 @@ are the coefficients of standardized x and y in normalized Hermite polynomials (
 import copy
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -96,6 +97,19 @@ def in_words(correlation: Correlation, matrix: np.ndarray, freedoms: Sequence[Fr
     )
 
 
+class Bonus(NamedTuple):
+    """What sizes scale: the components of a zone that grows with them, or the form inside an envelope of perfect form.
+
+    sizes    columns of the sizes
+    columns  of the components or of the coefficients of the form
+    scale    returns the factor (n,) of these for deviations (n, contributor)
+    """
+
+    sizes: np.ndarray
+    columns: np.ndarray
+    scale: Callable[[np.ndarray], np.ndarray]
+
+
 class Draws:
     """The draws of a model. Raises ModelError if rules cannot be applied to a feature.
 
@@ -109,9 +123,8 @@ class Draws:
 
     def __init__(self, nominal: Nominal) -> None:
         self.contributors, self.zones, self.mean_widths = fill_zones(nominal)
-        # Columns of sizes, and the columns that they scale by a factor: those of zones with a bonus, and of enveloped forms.
-        self._bonuses = [(np.unique(zone.sizes), zone.added, zone.scale) for zone in self.zones if zone.sizes is not None]
-        self._bonuses += [(np.array([one.size]), one.columns, one.scale) for one in envelopes(nominal)]
+        self._bonuses = [Bonus(np.unique(zone.sizes), zone.added, zone.scale) for zone in self.zones if zone.sizes is not None]
+        self._bonuses += [Bonus(np.array([form.size]), form.columns, form.scale) for form in envelopes(nominal)]
         self.shifts = [shift for pattern in nominal.patterns for shift in pattern.shifts]
         self._assembly = assembly = nominal.assembly
         self._column = {contributor.label: k for k, contributor in enumerate(self.contributors)}
@@ -222,10 +235,11 @@ class Draws:
     def _add_causes_and_bonuses(self, deviations: np.ndarray) -> None:
         """Add shared causes to sizes, scale components by the bonus of their sizes, and add shared causes to the rest."""
         measured = [column for columns, _ in self.populations for column in columns]
-        sizes = {int(size) for sizes, _, _ in self._bonuses for size in sizes}
+        sizes = {int(size) for bonus in self._bonuses for size in bonus.sizes}
         self._add_causes(deviations, lambda column: column in sizes)
-        for _, columns, scale in self._bonuses:
-            deviations[:, np.setdiff1d(columns, measured)] *= scale(deviations)[:, None]  # measured parts have used their bonus
+        for bonus in self._bonuses:
+            columns = np.setdiff1d(bonus.columns, measured)  # measured parts have used their bonus
+            deviations[:, columns] *= bonus.scale(deviations)[:, None]
         self._add_causes(deviations, lambda column: column not in sizes)
 
     @property
@@ -242,7 +256,7 @@ class Draws:
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
         sets += [list(map(int, columns)) for columns, _ in self.populations]
         together = [[*shift.columns, *map(int, shift.sources)] for shift in self.shifts]
-        together += [sorted({*map(int, sizes), *map(int, columns)}) for sizes, columns, _ in self._bonuses]
+        together += [sorted({*map(int, bonus.sizes), *map(int, bonus.columns)}) for bonus in self._bonuses]
         # What follows from others by more than a sum also follows from the causes that drive them.
         followed = {column for columns in together for column in columns}
         of_causes = ([self._column[label] for label in (cause.name, *cause.drives)] for cause in self._assembly.variables)

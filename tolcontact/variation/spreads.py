@@ -1,5 +1,6 @@
 """Spreads: how the freedoms of features fill the zones of their tolerances, from the innermost tolerance on."""
 
+import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,9 +16,18 @@ from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance import SIDES
 from tolcontact.discretization import Nominal
 from tolcontact.errors import GeometryFault, ModelError
-from tolcontact.features import FeatureOfSize, FormField, Freedom, Layer, NominalFeature, NominalPattern, minimum_zone
+from tolcontact.features import (
+    FeatureOfSize,
+    FormField,
+    Freedom,
+    Layer,
+    NominalFeature,
+    NominalPattern,
+    minimum_zone,
+    zone_kernel,
+)
 from tolcontact.features.freedoms import lot_score
-from tolcontact.features.minimum_zone import minimum_widths
+from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
 from tolcontact.features.tolerance_kinds import floats, includes_form
 from tolcontact.geometry.tolerances import MIN_PART
 from tolcontact.variation import zones
@@ -25,7 +35,6 @@ from tolcontact.variation.zones import SHARE, MemberZone, chi_share, directions
 
 DIRECTIONS = 1 << 12
 ENVELOPED, TINY = 1024, 1e-300  # realizations whose heights are computed at once; mm
-_KNOWN_WIDTHS: dict[str, np.ndarray] = {}
 FACES = 500  # that are drawn for the mean width of measured ones
 MIN_SPREAD, MAX_SPREAD = 1e-6, 1e3  # of the width
 INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
@@ -51,22 +60,31 @@ def mean_width(field: FormField, spreads: np.ndarray) -> float:
 
 
 def _widths(field: FormField) -> np.ndarray:
-    """Return the widths (direction,) [mm] of the minimum zones for unit vectors of coefficients in all directions evenly.
+    """Return the widths (direction,) of the minimum zones for unit vectors of coefficients in all directions evenly."""
+    zone = tuple((member.indices.tobytes(), member.rows.tobytes()) for member in field.zone)
+    return _unit_widths(zone, field.place_heights.T.tobytes(), field.modes)
 
-    Equal faces have equal widths. They are kept in the cache folder of the user.
+
+@functools.lru_cache(64)
+def _unit_widths(zone: tuple[tuple[bytes, bytes], ...], heights: bytes, modes: int) -> np.ndarray:
+    """Return the widths (direction,) [mm] of minimum zones of a number of modes with heights (place, mode).
+
+    The zone is given by the indices and the rows of its members: equal faces have equal widths. They are kept in the cache
+    folder of the user.
     """
-    sources = (Path(str(module.__file__)).read_bytes() for module in (minimum_zone, zones))
-    heights = field.place_heights.T.copy()
-    counts = np.array([DIRECTIONS, *heights.shape, len(field.zone)])
-    key = "widths-" + code_cache.digest(*sources, counts, *(content for member in field.zone for content in member), heights)
-    if key not in _KNOWN_WIDTHS:
-        stored = code_cache.load(key)
-        if stored is None:
-            zone = [(indices, np.ascontiguousarray(rows)) for indices, rows in field.zone]
-            stored = minimum_widths(zone, directions(field.modes)[:DIRECTIONS] @ heights.T).tobytes()
-            code_cache.store(key, stored)
-        _KNOWN_WIDTHS[key] = np.frombuffer(stored)
-    return _KNOWN_WIDTHS[key]
+    sources = (Path(str(module.__file__)).read_bytes() for module in (minimum_zone, zone_kernel, zones))
+    places = np.frombuffer(heights).reshape(-1, modes)
+    counts = np.array([DIRECTIONS, *places.shape, len(zone)])
+    key = "widths-" + code_cache.digest(*sources, counts, *(content for member in zone for content in member), heights)
+    stored = code_cache.load(key)
+    if stored is None:
+        members = [
+            ZoneMember(indices, np.frombuffer(rows).reshape(len(indices), -1))
+            for indices, rows in ((np.frombuffer(indices, dtype=int), rows) for indices, rows in zone)
+        ]
+        stored = minimum_widths(members, directions(modes)[:DIRECTIONS] @ places.T).tobytes()
+        code_cache.store(key, stored)
+    return np.frombuffer(stored)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +212,8 @@ def _fill_layers(
         members = _member_zones(pattern, layer, basis, spreads_of_forms)
         width = float(tolerance.width) or 1.0  # for which spreads are computed: the bonus scales them
         spread = (zones.extreme_spread if tolerance.rule == EXTREMES else zones.equal_spread)(members, spreads, count, width)
-        _check(pattern, tolerance, zones.share_inside([member.take(inner_count) for member in members], spreads, width))
+        _check_inner_share(tolerance, [member.take(inner_count) for member in members], spreads, width)
+        _check_rule(pattern, tolerance)
         spreads = np.concatenate([spreads, np.full(count, spread / tolerance.cp)])
         # The middle of the zone, in each component.
         middles = np.asarray(tolerance.uneven_shift * (pattern.offsets @ layer.controlled @ layer.controlled.T @ basis))
@@ -220,13 +239,18 @@ def _fill_layers(
             )
 
 
-def _check(pattern: NominalPattern, tolerance: GeometricTolerance, inner_share: float) -> None:
-    """Raise GeometryFault for a rule that form excludes, and if narrower tolerances leave too many features outside."""
-    if inner_share < zones.SHARE - INNER_SHARE_TOLERANCE:
+def _check_inner_share(tolerance: GeometricTolerance, members: Sequence[MemberZone], spreads: np.ndarray, width: float) -> None:
+    """Raise GeometryFault if narrower tolerances, with spreads (component,), leave too many features outside of the zone."""
+    share = zones.share_inside(members, spreads, width)
+    if share < zones.SHARE - INNER_SHARE_TOLERANCE:
         raise GeometryFault(
             f"{tolerance.kind} {tolerance.width:g}: the narrower tolerances within it leave "
-            f"{100 * (1 - inner_share):.2g} % of the features outside already; make these narrower, or it wider"
+            f"{100 * (1 - share):.2g} % of the features outside already; make these narrower, or it wider"
         )
+
+
+def _check_rule(pattern: NominalPattern, tolerance: GeometricTolerance) -> None:
+    """Raise GeometryFault for a rule that form excludes."""
     form, rule = pattern.form, tolerance.rule
     if form is not None and rule != INSIDE and includes_form(tolerance, pattern.geometries[0]):
         raise GeometryFault(
@@ -242,15 +266,17 @@ def _member_zones(
     coordinates = layer.controlled @ layer.controlled.T @ basis
     if len(pattern.members) > 1:
         coordinates = np.where(np.abs(coordinates) < MIN_PART, 0.0, coordinates)
-    tolerance, members = layer.tolerance, list[MemberZone]()
-    has_form = bool(spreads_of_forms) and includes_form(tolerance, pattern.geometries[0])
-    for k, (member, rows, place) in enumerate(zip(pattern.members, layer.rows, pattern.slices, strict=True)):
-        zone, form, geometry = MemberZone(rows, coordinates[place]), member.form, member.geometry
-        if has_form and form is not None:
-            offsets = geometry.rows((form.places, form.normals[:, None]))[:, 0]
-            heights = spreads_of_forms[k] * form.place_heights.T
-            zone = replace(zone, heights=heights, offsets=offsets, floats=floats(tolerance, geometry, rows))
-        members.append(zone)
+    tolerance = layer.tolerance
+    rigid_zones = [MemberZone(rows, coordinates[place]) for rows, place in zip(layer.rows, pattern.slices, strict=True)]
+    if not spreads_of_forms or not includes_form(tolerance, pattern.geometries[0]):
+        return rigid_zones
+    members = list[MemberZone]()
+    for member, zone, spreads in zip(pattern.members, rigid_zones, spreads_of_forms, strict=True):
+        form, geometry = member.form, member.geometry
+        assert form is not None
+        offsets = geometry.rows((form.places, form.normals[:, None]))[:, 0]
+        heights, is_floating = spreads * form.place_heights.T, floats(tolerance, geometry, zone.rows)
+        members.append(replace(zone, heights=heights, offsets=offsets, floats=is_floating))
     return members
 
 

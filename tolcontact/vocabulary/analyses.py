@@ -8,9 +8,6 @@ from tolcontact.vocabulary.labels import (
     AXES,
     AXIS,
     BODY_AXIS,
-    ESTIMATE,
-    INTERVAL,
-    OUTSIDE,
     STATE,
     STATES,
     STATUS_MEANING,
@@ -18,6 +15,7 @@ from tolcontact.vocabulary.labels import (
     ArchiveVariable,
     variable,
 )
+from tolcontact.vocabulary.summary import ESTIMATE, INTERVAL, OUTSIDE
 
 ANALYSES_GROUP = "statistics"  # the group of an archive that holds a group for each analysis
 GroupedBy = Literal["contributor", "feature", "part"]

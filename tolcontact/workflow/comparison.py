@@ -23,7 +23,8 @@ from tolcontact.simulation import Block
 from tolcontact.simulation.cluster import MapBlocks, Workers, mapping, threads_of
 from tolcontact.statistics import compare_runs as compare_results
 from tolcontact.vocabulary import CORRECTED
-from tolcontact.workflow.models import Choice, Model, assembly_of, check_affordable, check_counts, method_of
+from tolcontact.workflow.forecast import check_affordable
+from tolcontact.workflow.models import Choice, Model, assembly_of, check_counts, method_of
 
 WARM_UP_ROWS = 64  # realizations before the clock starts
 SELF_EXPLANATORY = ("resolution", "objective")  # choices with values that are clear without their names

@@ -12,7 +12,7 @@ from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.method import Solver
 from tolcontact.simulation import Block, ProgramFunction
-from tolcontact.simulation.packing import chunk_rows, dask_arrays, lazy_draws, lazy_realizations
+from tolcontact.simulation.lazy import chunk_rows, dask_arrays, lazy_draws, lazy_realizations
 from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
 ARCHIVE_SETTINGS = ("kept", "fields")  # settings of a run that do not affect its realizations

@@ -1,19 +1,11 @@
-"""Models, the input of `run` and of analyses: from the path of a script or an archive to the compiled program.
+"""Models, the input of `run` and of analyses: from the path of a script or an archive to the compiled program."""
 
-Forecasts state the time, memory and disk space of a run or an analysis of a program before it begins.
-"""
-
-import logging
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tolcontact import archive
-from tolcontact.archive import bytes_of_rows, size_in_words
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model, write_json
@@ -22,23 +14,13 @@ from tolcontact.errors import ArchiveError, ModelError, OptionError, TolcontactE
 from tolcontact.method import Method, Solver
 from tolcontact.plausibility import warn_of_nominal
 from tolcontact.replacing import check_identities
-from tolcontact.simulation import block_rows, simulate_blocks
-from tolcontact.system.machine import machine_memory, peak_memory
-from tolcontact.vocabulary import BLOCK_ROWS
 
 DEFAULT_SOLVER: Solver = "qpoases"
 COUNTS = {  # smallest and largest
     "samples": (2, 10**12), "seed": (0, 2**63 - 1), "surfaces": (0, 10**6),
 }  # fmt: skip
-FIRST_TRIAL_ROWS = 4
-MIN_TRIAL_SECONDS = 0.25  # a shorter trial measures the start of a block
-MIN_ANNOUNCED_ROWS = 1_000_000
-MIN_ANNOUNCED_SECONDS = 60.0
-MAX_SECONDS = 30 * 86_400.0
 Model = Assembly | Callable[[], Assembly] | str | Path
 Choice = Method | Mapping[str, Any]  # a method, or some of its choices; the model's own method has the others
-
-log = logging.getLogger(__name__)
 
 
 def build(model: Model, *, solver: Solver = DEFAULT_SOLVER, method: Choice | None = None) -> Program:
@@ -154,68 +136,3 @@ def check_counts(**counts: int) -> None:
         smallest, largest = COUNTS[option]
         if isinstance(value, bool) or not isinstance(value, int) or not smallest <= value <= largest:
             raise OptionError(f"{option} is {value!r}; expected a whole number from {smallest} to {largest}")
-
-
-def announce(program: Program, *, samples: int, seed: int, keep: str, threads: int) -> None:
-    """Log a warning with the time and space that `samples` more realizations need on `threads` threads, if that is much.
-
-    Raises OptionError if the run would take more than 30 days.
-    """
-    if samples < MIN_ANNOUNCED_ROWS and block_rows(program) == BLOCK_ROWS:
-        return
-    seconds = _checked_seconds(program, samples, seed, threads)
-    if samples >= MIN_ANNOUNCED_ROWS or seconds > MIN_ANNOUNCED_SECONDS:
-        nominal = program.nominal
-        points = sum(len(pair.P_m) for pair in nominal.pairs)
-        peak = peak_memory()
-        memory = "" if peak is None else f", {size_in_words(peak)} of memory"
-        log.warning(
-            "%d parts, %d contact pairs, %d contact points: %d realizations will take about %s%s, and %s in an archive",
-            len(nominal.parts), len(nominal.pairs), points, samples, duration(seconds), memory,
-            size_in_words(bytes_of_rows(nominal, keep, samples)),
-        )  # fmt: skip
-
-
-def check_affordable(program: Program, *, samples: int, seed: int, threads: int, kept: int | None = None) -> None:
-    """Raise OptionError if `samples` realizations, with `kept` stored numbers each, would take too much time or memory.
-
-    By default the numbers are deviations, and measures in both states.
-    """
-    numbers = kept or len(program.nominal.contributors) + 2 * len(program.nominal.measures)
-    needed, memory = np.dtype(float).itemsize * samples * numbers, machine_memory()
-    if needed > memory:
-        raise OptionError(
-            f"{samples} realizations need {size_in_words(needed)} of memory, and this machine has {size_in_words(memory)}; "
-            "ask for fewer samples"
-        )
-    if samples >= MIN_ANNOUNCED_ROWS:
-        _checked_seconds(program, samples, seed, threads)
-
-
-def _checked_seconds(program: Program, samples: int, seed: int, threads: int) -> float:
-    """Return the time [s] that `samples` realizations need on `threads` threads. Raises OptionError above 30 days."""
-    # Trials grow up to a block. Loading takes longer than a block.
-    trial, seconds = FIRST_TRIAL_ROWS, 0.0
-    list(simulate_blocks(program, samples=trial, seed=seed, threads=1))
-    while True:
-        started = time.perf_counter()
-        list(simulate_blocks(program, samples=trial, seed=seed, threads=1))
-        seconds = time.perf_counter() - started
-        if seconds > MIN_TRIAL_SECONDS or trial >= block_rows(program):
-            break
-        trial *= 8
-    seconds = seconds / trial / threads
-    if seconds * samples > MAX_SECONDS:
-        raise OptionError(
-            f"{samples} realizations would take about {duration(seconds * samples)}; ask for at most "
-            f"{int(MAX_SECONDS / seconds)}, which take {duration(MAX_SECONDS)}"
-        )
-    return seconds * samples
-
-
-def duration(seconds: float) -> str:
-    """Return a time in words."""
-    for size, unit in ((86_400, "days"), (3600, "h"), (60, "min")):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.0f} {unit}"
-    return f"{seconds:.0f} s"

@@ -1,7 +1,4 @@
-"""Runs: from a declared assembly to an archive, up to a stopping rule, and its results.
-
-Sums over the realizations give the displacement fields, and count touching contact points.
-"""
+"""Runs: from a declared assembly to an archive, up to a stopping rule, and its results."""
 
 import logging
 import math
@@ -14,35 +11,31 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as terms
-from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_archive, open_unchecked, row_values
-from tolcontact.arrays import Array, Float, Int
+from tolcontact.archive import ArchiveWriter, Run, locked_archive, open_archive, open_unchecked
 from tolcontact.compilation import Program
-from tolcontact.contact import pair_search
 from tolcontact.errors import OptionError, check_choice
 from tolcontact.method import Solver
-from tolcontact.replacing import check_identities, temporary_folder
-from tolcontact.simulation import Block, ProgramFunction, block_rows
+from tolcontact.replacing import check_identities
+from tolcontact.simulation import block_rows, other_objectives
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
-from tolcontact.simulation.run_checks import COMPARED_ROWS, MIN_COMPARED, by_objective, check_surfaces, simulated_poses, warn_of
-from tolcontact.statistics import STATISTICS, BlockSums, DisplacementFields, TouchingShares, estimate_of
+from tolcontact.simulation.surfaces import check_surfaces, simulated_poses, warn_of
+from tolcontact.statistics import STATISTICS, estimate_of
 from tolcontact.statistics.measure_statistics import HALF_WIDTH, StatisticRequest
+from tolcontact.temporary import temporary_folder
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, OBJECTIVES_GROUP, OUTSIDE, PLANS, PPM, FieldChoice, Kept, Plan
 from tolcontact.workflow.accessor import Results
-from tolcontact.workflow.models import Choice, Model, announce, check_counts, check_program, program_of
+from tolcontact.workflow.forecast import announce
+from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
+from tolcontact.workflow.run_sums import BlockTotals, RunSums
 
 MIN_GROWTH, MAX_GROWTH = 1.25, 16.0
 MARGIN = 1.05  # times the estimated number of realizations that the interval needs
 MAX_REALIZATIONS = 100_000_000
-MAX_COUNTED = 2048  # realizations whose touching points are counted
-MAX_GAPS = 20_000_000  # of all points in all these realizations
 MAX_WITHOUT_INTERVAL = 10_000  # realizations: an estimate without an interval at this number will not get one
 EXAMPLES = ("corner height: 6 sigma +-1 %", "gap: mean +-0.001")
 __all__ = ["SURFACES", "RunProgress", "open_archive", "run", "write_archive", "write_run"]
 
 SURFACES = 64
-TouchingCounts = tuple[Int[Array, " point"], int]  # contacts at each contact point, and the number of realizations
-BlockTotals = tuple[BlockSums, TouchingCounts]
 RunProgress = Callable[[int], None]  # called with the number of finished realizations
 
 log = logging.getLogger(__name__)
@@ -68,6 +61,10 @@ class Target:
         is_ppm = request.statistic == PPM
         half = request.value / 100 if request.is_percent else request.value * (1e-6 if is_ppm else 1.0)
         return cls(request, request.measure, OUTSIDE if is_ppm else request.statistic, half, request.is_percent)
+
+    def check(self, program: Program) -> None:
+        """Raise OptionError if the model has no such measure."""
+        self.request.number_of([measure.name for measure in program.nominal.measures])
 
     def next(self, path: Path, program: Program) -> int | None:
         """Return the number of realizations that the archive should have next.
@@ -105,81 +102,6 @@ class Target:
         """Return the estimate, the half-width of its interval, and the largest permitted half-width."""
         estimate, lower, upper = estimate_of(results, self.measure, self.statistic)
         return estimate, (upper - lower) / 2, self.half * (abs(estimate) if self.is_relative else 1.0)
-
-
-def _count_touching(
-    program: Program, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]
-) -> TouchingCounts:
-    """Return the counts at corrected poses (realization, part, 12), for deviations (realization, contributor)."""
-    counts = [np.zeros(len(pair.P_m), dtype=np.int64) for pair in program.nominal.pairs]
-    if len(poses) and counts:
-        _, relative = program.observed(poses, deviations)
-        for k, pair in enumerate(program.nominal.pairs):
-            if not pair.elastic:
-                X_RM = np.ascontiguousarray(relative[:, k])
-                counts[k] = pair_search(program, k).touching_counts(X_RM, deviations, terms.TOUCHING_GAP)
-    return np.concatenate([np.zeros(0, dtype=np.int64), *counts]), len(poses)
-
-
-@dataclass(frozen=True, eq=False)
-class _BlockReduction(ProgramFunction):
-    """Reduction of a block, where it is simulated, to stored rows and sums.
-
-    kept      labels of the stored variables
-    counted   number of realizations, starting with the first, for counting touching points
-    """
-
-    kept: tuple[str, ...]
-    fields: DisplacementFields
-    counted: int
-
-    def __call__(self, program: Program, block: Block) -> tuple[dict[str, np.ndarray], BlockTotals]:
-        # Reprojected contact points differ from the points of the model.
-        rows = np.flatnonzero(block.searched[: max(self.counted - block.start, 0)] == 0)
-        counts = _count_touching(program, block.poses[rows, terms.CORRECTED], block.deviations[rows])
-        fields = self.fields.sums(block.poses, block.start, block.status, block.load)
-        return row_values(block, self.kept, program.nominal), (fields, counts)
-
-
-class RunSums:
-    """The sums of one run.
-
-    fields   the displacement fields of all parts; their sums are stored in checkpoints
-    """
-
-    def __init__(self, program: Program, run: Run) -> None:
-        self._program, self._seed, bending = program, run.seed, program.bending
-        self.fields = DisplacementFields(program.nominal, str(run.fields), bending.parts if bending else None)
-
-    def start_from(self, writer: ArchiveWriter) -> None:
-        """Start from the last checkpoint of an archive, if it has one."""
-        program, pairs, kept = self._program, self._program.nominal.pairs, {row.variable for row in writer.kept}
-        # Touching points are counted only if a reader of the archive could recompute the gaps.
-        need_deviations = any(pair.is_supports or any(face is not None for face in pair.deviating) for pair in pairs)
-        is_known = terms.ROTATION in kept and (terms.DEVIATION in kept or not need_deviations)
-        points = max(sum(len(pair.P_m) for pair in pairs), 1)
-        counted = min(MAX_COUNTED, -(-MAX_GAPS // points)) if is_known else 0
-        self.of_blocks = _BlockReduction(tuple(row.label for row in writer.kept), self.fields, counted)
-        self.fields.resume_from(writer.sums)
-        # Pairs of elastic parts touch where they are bent.
-        is_rigid = [np.full(len(pair.P_m), not pair.elastic) for pair in pairs]
-        self._touching = TouchingShares(np.concatenate([np.zeros(0, dtype=bool), *is_rigid]))
-        if end := min(writer.rows, counted):
-            rows, poses = writer.first_poses(end)
-            self._touching.add(*_count_touching(program, poses, program.draws.rows(rows, seed=self._seed)))
-
-    def merge(self, sums: BlockTotals) -> None:
-        """Add the sums of the next block."""
-        fields, counts = sums
-        self.fields.merge(fields)
-        self._touching.add(*counts)
-
-    @property
-    def groups(self) -> dict[str, dict[terms.ArchiveVariable, Any]]:
-        """The fields and shares over the realizations so far, as groups of an archive."""
-        parts = [terms.field_of(part.name) for part in self._program.nominal.last_parts]
-        touching = dict(zip(terms.TOUCHING, self._touching.values(), strict=True))
-        return dict(zip(parts, self.fields.fields(), strict=True)) | {"contact": touching}
 
 
 # The import registers the methods of results, for anyone who runs a model or opens an archive.
@@ -268,7 +190,7 @@ def write_run(
         program = program_of(model, solver, method)
         program = replace(program, draws=program.draws.planned(settings.plan))
         if target:
-            target.request.number_of([measure.name for measure in program.nominal.measures])  # refuses unknown measures
+            target.check(program)
         write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
     if target:
         with open_unchecked(path) as results:
@@ -325,9 +247,9 @@ def _simulate(
                     progress(writer.rows)
         with writer.completed(sums.groups):
             _check(program, writer, seed)
-            if writer.rows >= MIN_COMPARED and not writer.has_objectives():
-                first = writer.first_outcomes(COMPARED_ROWS)
-                writer.write_group(OBJECTIVES_GROUP, by_objective(program, *first, blocks, seed))
+            if writer.rows >= other_objectives.MIN_REALIZATIONS and not writer.has_objectives():
+                first = writer.first_outcomes(other_objectives.ROWS)
+                writer.write_group(OBJECTIVES_GROUP, other_objectives.by_objective(program, *first, blocks, seed))
     except BaseException:
         if writer.has_new_rows:
             if writer.is_between_blocks:

@@ -16,7 +16,8 @@ from tests.test_worst_case import small_ra1, values
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher
+from tolcontact.analyses.extreme_search import Evaluation, Searcher
+from tolcontact.analyses.searches import Effort
 from tolcontact.analyses.worst_case import search_worst_case
 
 

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tolcontact.cli.app import app
-from tolcontact.cli.output import shown_progress
+from tolcontact.cli.progress import shown_progress
 
 
 def test_help_states_values_only_of_options_that_take_one():

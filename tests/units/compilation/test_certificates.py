@@ -7,7 +7,7 @@ import numpy as np
 from tests import cases
 from tests.helpers import PAPER, joined, simulate
 from tests.units.compilation.recompiling import recompiled
-from tolcontact.compilation.contact_solver import active_set, solve_active
+from tolcontact.compilation.active_set import active_set, solve_active
 from tolcontact.compilation.solvers import Plugin
 from tolcontact.simulation import simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status

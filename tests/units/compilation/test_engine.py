@@ -16,11 +16,11 @@ from tolcontact.compilation import contact_qp, qp_terms
 from tolcontact.compilation.functions import InterpretedFunction
 from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
 from tolcontact.compilation.functions.native import NativeFunction
-from tolcontact.compilation.functions.translation import OPERATIONS
+from tolcontact.compilation.functions.operations import OPERATIONS
 from tolcontact.compilation.qp_terms import inline, is_convex
 from tolcontact.discretization import discretize
 from tolcontact.mechanics.groups import contact_groups
-from tolcontact.mechanics.round_gap import pair_gaps
+from tolcontact.mechanics.pair_gaps import pair_gaps
 from tolcontact.simulation import simulate_blocks
 
 RNG = np.random.default_rng(5)

@@ -5,8 +5,8 @@ import numpy as np
 from tests.cases.seats import seat
 from tests.helpers import compiled
 from tests.units.contact import plain_scan
+from tolcontact.contact.raised_scan import raised_scan
 from tolcontact.contact.scan import pair_scan
-from tolcontact.contact.searched_scan import raised_scan
 
 
 def test_heights_that_are_summed_up_once_give_the_same_deepest_points():

@@ -3,8 +3,8 @@
 import numpy as np
 
 from tolcontact.compilation import ACCURACY
+from tolcontact.contact.progress import PATIENCE, PATIENCE_IN_CONFLICT, Progress
 from tolcontact.contact.record import initial_numbers
-from tolcontact.contact.repeated_steps import PATIENCE, PATIENCE_IN_CONFLICT, Progress
 from tolcontact.contact.resolver import is_better
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import Outcome, State

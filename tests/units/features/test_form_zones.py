@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 import tolcontact as tc
 from tests.helpers import nightly
 from tests.test_form_zones import field_of
-from tolcontact.features.minimum_zone import minimum_widths
+from tolcontact.features.minimum_zone import ZoneMember, minimum_widths
 
 
 def width_by_programme(places, heights):
@@ -31,5 +31,5 @@ def test_the_least_zone_by_closed_form():
     """A bowl over a square needs its depth, a saddle twice its height, a plane nothing."""
     x, y = (grid.ravel() for grid in np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21)))
     heights = np.array([x**2 + y**2, x * y, 3 * x - 2 * y + 1])
-    zone = [(np.arange(len(x)), np.column_stack([x**0, x, y]))]
+    zone = [ZoneMember(np.arange(len(x)), np.column_stack([x**0, x, y]))]
     np.testing.assert_allclose(minimum_widths(zone, heights), [2, 2, 0], rtol=1e-6, atol=1e-6)

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tolcontact.discretization import discretize
-from tolcontact.geometry.plane_kernel import keep_over
+from tolcontact.geometry.region_kernel import keep_over
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, -0.7, 0.2)])

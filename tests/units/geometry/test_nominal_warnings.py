@@ -7,7 +7,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tests.helpers import nightly
-from tolcontact.geometry.nearest_elements import SolidBody, common_ball
+from tolcontact.geometry.body_overlap import SolidBody, common_ball
 
 
 @pytest.mark.parametrize("seed", [1, *nightly(2, 3, 4)])
@@ -41,9 +41,9 @@ def test_depths_agree_with_planes_and_winding_numbers():
     points = np.random.default_rng(1).uniform(-12, 12, (2000, 3))
     for mesh in (trimesh.creation.icosphere(2, 10), trimesh.creation.box((9, 5, 2))):  # convex
         heights = ((points[:, None] - mesh.triangles_center) * mesh.face_normals).sum(axis=2).max(axis=1)
-        depths = SolidBody(mesh).depth_inside(points)
+        depths = SolidBody(mesh).depth(points)
         assert (depths > 0).any() and (depths[heights > 0] < 0).all()
         assert depths[heights < 0] == pytest.approx(-heights[heights < 0], abs=1e-9)
     ring = trimesh.creation.annulus(5, 11, 10, sections=24)
     turns = igl.winding_number(np.array(ring.vertices), np.array(ring.faces, dtype=np.int64), points)
-    assert ((SolidBody(ring).depth_inside(points) > 0) == (turns > 0.5)).all()
+    assert ((SolidBody(ring).depth(points) > 0) == (turns > 0.5)).all()

@@ -6,8 +6,8 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from tolcontact.geometry.candidates import hole_clearances, outline
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
+from tolcontact.geometry.outlines import hole_clearances, outline
 from tolcontact.geometry.places import Look
 from tolcontact.geometry.surface import Surface
 

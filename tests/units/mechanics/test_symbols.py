@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
-from tolcontact.mechanics.correction import Mobility, displacement_energy, increments, linear, moment_table, published, rigid
+from tolcontact.mechanics.correction import Mobility, increments, linear, published, rigid
+from tolcontact.mechanics.displacement import displacement_energy, moment_table
 from tolcontact.mechanics.gap import gap_matrix
 from tolcontact.mechanics.measures import record, replay
 from tolcontact.mechanics.pose import Pose, rotation

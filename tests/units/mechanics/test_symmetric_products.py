@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from tolcontact.mechanics.correction import moment_table, moments_about
+from tolcontact.mechanics.displacement import moment_table, moments_about
 from tolcontact.mechanics.pose import congruent
 
 

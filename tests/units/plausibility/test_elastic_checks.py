@@ -9,7 +9,7 @@ import pytest
 import tolcontact as tc
 from tests.helpers import call, compiled
 from tests.test_elastic_parts import block_of, loads_of, supported_beam, tips
-from tolcontact.compilation.program import stiffer, with_flexibility
+from tolcontact.compilation.other_flexibility import stiffer, with_flexibility
 from tolcontact.errors import NominalWarning
 from tolcontact.mechanics.flexibility import elastic_bodies, part_flexibilities
 from tolcontact.plausibility import elastic_remarks

@@ -11,9 +11,10 @@ from tests.test_cad import COVER
 from tests.test_features_from_pmi import HOLE, ROUND, TOP, cover, datums, drawing, spreads, spreads_of
 from tolcontact.geometry.shapes import shape
 from tolcontact.pmi import OF_DATUMS, OF_TOLERANCES
-from tolcontact.pmi.declared import declared_file, script
+from tolcontact.pmi.declared import declared_file
 from tolcontact.pmi.drafts import declare_features
 from tolcontact.pmi.reading import read_pmi
+from tolcontact.pmi.script import script
 
 
 def test_the_script_of_a_file_declares_the_same(tmp_path):

@@ -82,7 +82,7 @@ def test_each_measurement_has_a_row_with_its_verdict():
     assert [rows[name].verdict for name in names] == ["meets", "does not meet", ""]
     assert [rows[name].is_good for name in names] == [True, False, None]
     assert rows["wide"].limits == ("0", "-100", "100") and rows["open"].limits == ("0", "", "")
-    assert [figures["state"] for figures in rows["wide"].states] == ["with contact", "without contact"]
+    assert [figures.state for figures in rows["wide"].states] == ["with contact", "without contact"]
     lines = list(verdict_lines(summary))
     assert "wide: meets its limits" in lines and not [line for line in lines if line.startswith("open")]
 
@@ -116,7 +116,7 @@ def test_sides_without_a_limit_have_no_noise_either():
     summary = tc.summarize(tc.run(assembly({"one": (None, 0.5)}), samples=100, seed=1, solver="daqp"))
     assert isinstance(summary, xr.Dataset)
     (row,) = [row for row in result_rows(summary) if row.name == "one"]
-    assert row.limits == ("0", "", "0.5") and row.states[0]["cells"][3] == "-" and "[" in row.states[0]["cells"][4]
+    assert row.limits == ("0", "", "0.5") and row.states[0].cells[3] == "-" and "[" in row.states[0].cells[4]
 
 
 def test_a_nominal_value_of_rounding_is_nothing_beside_its_limits():

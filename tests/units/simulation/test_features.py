@@ -7,7 +7,7 @@ import trimesh
 import tolcontact as tc
 from tests.cases.round_contact import BARREL
 from tests.test_features import EXACT
-from tolcontact.simulation.run_checks import check_surfaces
+from tolcontact.simulation.surfaces import check_surfaces
 
 
 def test_surfaces_are_checked_as_large_as_they_are():

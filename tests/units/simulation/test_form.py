@@ -7,7 +7,7 @@ import pytest
 import tolcontact as tc
 from tests.cases.seats import seat
 from tests.helpers import SEATED, simulate
-from tolcontact.simulation.run_checks import check_surfaces, warn_of
+from tolcontact.simulation.surfaces import check_surfaces, warn_of
 from tolcontact.vocabulary import CORRECTED
 
 

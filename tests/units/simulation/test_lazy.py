@@ -6,7 +6,8 @@ import pytest
 import tolcontact as tc
 from tests import cases
 from tolcontact.simulation.cluster import local_cluster
-from tolcontact.simulation.packing import CHUNK_BLOCKS, pack_model, packed_program
+from tolcontact.simulation.lazy import CHUNK_BLOCKS
+from tolcontact.simulation.packing import pack_model, packed_program
 
 
 @pytest.mark.nightly

@@ -7,7 +7,7 @@ import tolcontact as tc
 from tests.cases.fits import CLEARANCE, LENGTH, PULL, RADIUS, shaft_in_a_bore
 from tests.helpers import SEATED, simulate
 from tests.test_round_forms import heights_on
-from tolcontact.simulation.run_checks import check_surfaces
+from tolcontact.simulation.surfaces import check_surfaces
 from tolcontact.vocabulary import CORRECTED, Status
 
 

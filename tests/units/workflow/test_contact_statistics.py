@@ -4,7 +4,7 @@ import numpy as np
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.workflow.runs import MAX_COUNTED
+from tolcontact.workflow.run_sums import MAX_COUNTED
 
 
 def test_a_block_touches_in_half_of_the_realizations_at_all_its_points():

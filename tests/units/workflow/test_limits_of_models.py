@@ -5,7 +5,7 @@ import pytest
 import tolcontact as tc
 from tests.helpers import ROOT
 from tests.test_limits_of_models import RA1
-from tolcontact.workflow.models import announce
+from tolcontact.workflow.forecast import announce
 
 
 def test_a_run_that_would_take_longer_than_anybody_waits_is_refused():

@@ -5,8 +5,8 @@ import functools
 import math
 import threading
 import weakref
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -33,7 +33,7 @@ class InterpretedFunction:
         self._caller, self._fixed_inputs = ca.Function("caller", inputs, function.call(inputs)), fixed_inputs or {}
         self._sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
         self._solvers = [function] if function.is_a("Conic") else []
-        self._buffers: dict[int, tuple[Any, ...]] = {}  # by width, see _allocate
+        self._buffers: dict[int, _Buffers] = {}  # by width
         self._is_new = True
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
@@ -69,45 +69,73 @@ class InterpretedFunction:
             if width not in self._buffers:
                 with CONSTRUCTION_LOCK:
                     self._buffers[width] = self._allocate(width)
-            evaluate, buffer, arguments, outputs = self._buffers[width]
+            buffers = self._buffers[width]
             count = rows.stop - rows.start
-            free = (array for i, array in enumerate(arguments) if i not in self._fixed_inputs)
+            free = (array for i, array in enumerate(buffers.arguments) if i not in self._fixed_inputs)
             for array, values in zip(free, inputs, strict=True):
                 array[:count] = values[rows]
                 array[count:] = values[rows.stop - 1]  # unused rows repeat the last one
             try:
-                evaluate()
+                buffers.evaluate()
             except RuntimeError:  # CasADi's only exception: bounds that are NaN
                 succeeds = False
             else:
-                for array, result in zip(outputs, results, strict=True):
+                for array, result in zip(buffers.outputs, results, strict=True):
                     result[rows] = array[:count]
-                succeeds = bool(buffer.ret() == 0)
+                succeeds = bool(buffers.memory.ret() == 0)
         if not succeeds:
             for solver in self._solvers:
                 solver.checkout()  # takes the corrupted memory and never releases it: the next evaluation gets another
         self._is_new = not succeeds
         return succeeds
 
-    def _allocate(self, width: int) -> tuple[Any, ...]:
-        """Return a callable that evaluates the Function `width` times, its buffer, and the arrays of arguments and outputs."""
+    def _allocate(self, width: int) -> "_Buffers":
+        """Return the arrays of `width` realizations, with the values of fixed inputs."""
         function = self._caller.map(width) if width > 1 else self._caller
-        buffer, evaluate = function.buffer()
+        memory, evaluate = function.buffer()
         arguments = [np.zeros((width, function.nnz_in(i) // width)) for i in range(function.n_in())]
         outputs = [np.zeros((width, function.nnz_out(i) // width)) for i in range(function.n_out())]
-        for i, array in enumerate(arguments):  # the buffer does not keep them alive
+        for i, array in enumerate(arguments):
             if i in self._fixed_inputs:
                 array[:] = self._fixed_inputs[i]
-            buffer.set_arg(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
+            memory.set_arg(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
         for i, array in enumerate(outputs):
-            buffer.set_res(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
-        return evaluate, buffer, arguments, outputs
+            memory.set_res(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
+        return _Buffers(evaluate, memory, arguments, outputs)
+
+
+class _Buffers(NamedTuple):
+    """A Function of many realizations at once, with arrays at fixed addresses.
+
+    evaluate    evaluates the Function on the arrays
+    memory      CasADi's buffer, which knows the addresses but does not keep the arrays alive
+    arguments   an array (realization, stored entry) for each input
+    outputs     an array (realization, stored entry) for each output
+    """
+
+    evaluate: Callable[[], None]
+    memory: Any
+    arguments: list[np.ndarray]
+    outputs: list[np.ndarray]
 
 
 # Evaluations, in all processes, after which a Function without calls is compiled. Compiling takes as long as interpreting this
 # number of evaluations once or twice. So the total time is at most about three times the time of the best choice in hindsight.
 MIN_COMPILED_CALLS = 10_000
 MAX_INSTRUCTIONS = 300_000  # that are compiled; more are interpreted, since compiling them takes more than a gigabyte
+
+
+class _Evaluations:
+    """The number of evaluations of a Function by this process and by earlier processes that stored it."""
+
+    def __init__(self, key: str) -> None:
+        self._key = f"{key}-evaluations"
+        stored = code_cache.load(self._key) or b""
+        self.number = int(stored) if stored.isdigit() else 0
+
+    def store(self) -> None:
+        """Store the number for later processes."""
+        code_cache.write(self._key, str(self.number).encode())
 
 
 def _instructions(function: ca.Function) -> tuple[int, int]:
@@ -134,7 +162,7 @@ class NamedFunction:
         compiled, executed = _instructions(function)
         self._may_be_compiled = compiled <= MAX_INSTRUCTIONS
         self._min_calls = MIN_COMPILED_CALLS * compiled // max(executed, 1)
-        self._evaluations: list[int] | None = None  # the number of evaluations by this process and by earlier ones
+        self._evaluations: _Evaluations | None = None  # the first call loads it
         self._lock = threading.Lock()
 
     @classmethod
@@ -180,12 +208,10 @@ class NamedFunction:
                 self.native = NativeFunction.from_cache(self.function, key)
                 if self.native is not None:
                     return False
-                name = f"{key}-evaluations"
-                stored = code_cache.load(name) or b""
-                self._evaluations = [int(stored) if stored.isdigit() else 0]
-                weakref.finalize(self, lambda number: code_cache.write(name, str(number[0]).encode()), self._evaluations)
-            self._evaluations[0] += count
-            self._may_be_compiled = self._evaluations[0] <= self._min_calls
+                self._evaluations = _Evaluations(key)
+                weakref.finalize(self, self._evaluations.store)
+            self._evaluations.number += count
+            self._may_be_compiled = self._evaluations.number <= self._min_calls
             return not self._may_be_compiled
 
 

@@ -18,7 +18,8 @@ from llvmlite import binding, ir
 
 from tolcontact import code_cache
 from tolcontact.compilation.functions import translation
-from tolcontact.compilation.functions.translation import LANES, memory_of, module_of, sizes_of
+from tolcontact.compilation.functions.operations import LANES
+from tolcontact.compilation.functions.translation import memory_of, module_of, sizes_of
 from tolcontact.system.machine import free_address_space
 
 MIN_MEMORY, MEMORY_FACTOR = 1 << 26, 16  # bytes, and bytes per character of a module: LLVM takes 9 for 88 000 instructions

@@ -6,78 +6,19 @@ numbers through memory. A Function that another one calls is translated once, ho
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import accumulate, groupby
-from operator import itemgetter
+from typing import NamedTuple
 
 import casadi as ca
 from llvmlite import ir
 
+from tolcontact.compilation.functions.operations import DOUBLE, LANES, OPERATIONS, VECTOR, constant
+
 SEGMENT = 1000  # instructions
 MIN_MOVED = 8  # inputs or results in a row that a loop copies
 VECTOR_ALIGNMENT = 8  # bytes: guaranteed alignment of the memory
-LANES = 4  # realizations
-DOUBLE = ir.DoubleType()
-VECTOR = ir.VectorType(DOUBLE, LANES)
-
-
-def constant(value: float) -> ir.Constant:
-    """Return a number for all realizations."""
-    return VECTOR([DOUBLE(value)] * LANES)
-
-
-ZERO, ONE = constant(0.0), constant(1.0)
-
-
-def _truth(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
-    """Return 1.0 or 0.0 for a truth value."""
-    return builder.select(value, ONE, ZERO)
-
-
-def _holds(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
-    return builder.fcmp_unordered("!=", x, ZERO)
-
-
-def _extreme(builder: ir.IRBuilder, sign: str, x: ir.Value, y: ir.Value) -> ir.Value:
-    """Return C's fmin ("<=") or fmax (">="): the other operand if one is NaN, and the first of two equal operands."""
-    return builder.select(builder.or_(builder.fcmp_ordered(sign, x, y), builder.fcmp_unordered("uno", y, y)), x, y)
-
-
-def _call(name: str) -> Callable[[ir.IRBuilder, ir.Value], ir.Value]:
-    def call(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
-        full = f"llvm.{name}.v{LANES}f64"
-        declared = builder.module.globals.get(full) or ir.Function(builder.module, ir.FunctionType(VECTOR, [VECTOR]), full)
-        return builder.call(declared, [x])
-
-    return call
-
-
-OPERATIONS: dict[int, Callable[..., ir.Value]] = {
-    ca.OP_ASSIGN: lambda b, x: x,
-    ca.OP_ADD: ir.IRBuilder.fadd,
-    ca.OP_SUB: ir.IRBuilder.fsub,
-    ca.OP_MUL: ir.IRBuilder.fmul,
-    ca.OP_DIV: ir.IRBuilder.fdiv,
-    ca.OP_NEG: ir.IRBuilder.fneg,
-    ca.OP_SQ: lambda b, x: b.fmul(x, x),
-    ca.OP_TWICE: lambda b, x: b.fadd(x, x),
-    ca.OP_INV: lambda b, x: b.fdiv(ONE, x),
-    ca.OP_FMIN: lambda b, x, y: _extreme(b, "<=", x, y),
-    ca.OP_FMAX: lambda b, x, y: _extreme(b, ">=", x, y),
-    ca.OP_LT: lambda b, x, y: _truth(b, b.fcmp_ordered("<", x, y)),
-    ca.OP_LE: lambda b, x, y: _truth(b, b.fcmp_ordered("<=", x, y)),
-    ca.OP_EQ: lambda b, x, y: _truth(b, b.fcmp_ordered("==", x, y)),
-    ca.OP_NE: lambda b, x, y: _truth(b, b.fcmp_unordered("!=", x, y)),
-    ca.OP_NOT: lambda b, x: _truth(b, b.not_(_holds(b, x))),
-    ca.OP_AND: lambda b, x, y: _truth(b, b.and_(_holds(b, x), _holds(b, y))),
-    ca.OP_OR: lambda b, x, y: _truth(b, b.or_(_holds(b, x), _holds(b, y))),
-    ca.OP_IF_ELSE_ZERO: lambda b, x, y: b.select(_holds(b, x), y, ZERO),
-    **{getattr(ca, f"OP_{name.upper()}"): _call(name) for name in ("sqrt", "fabs", "sin", "cos", "exp", "log")},
-}
 _INDEX = ir.IntType(64)
 _MEMORY = VECTOR.as_pointer()
 _TRANSLATED = ir.FunctionType(ir.VoidType(), [_MEMORY] * 3)
-Instruction = tuple[int, list[int], list[int], int]
-# An operation, the work entries that it writes and reads (for outputs and inputs, argument and entry), and its index in the
-# Function.
 
 
 def sizes_of(function: ca.Function) -> tuple[list[int], list[int]]:
@@ -174,6 +115,20 @@ def _transfer(builder: ir.IRBuilder, k: ir.Value, size: ir.Value, arguments: Seq
     builder.store(value, builder.gep(target, [second]), align=VECTOR_ALIGNMENT)
 
 
+class Instruction(NamedTuple):
+    """An instruction of a Function.
+
+    to         the work entries that it writes; for an output, argument and entry
+    operands   the work entries that it reads; for an input, argument and entry
+    position   its index in the Function
+    """
+
+    operation: int
+    to: list[int]
+    operands: list[int]
+    position: int
+
+
 def _accesses(part: Sequence[Instruction]) -> tuple[set[int], set[int]]:
     """Return the work entries that instructions read before they write them, and the work entries that they write."""
     reads, writes = set[int](), set[int]()
@@ -230,7 +185,7 @@ class _Translation:
     def _segments(self, function: ca.Function) -> list[ir.Function]:
         """Return functions that together execute all instructions; each stores the work entries that later ones read."""
         instructions = [
-            (function.instruction_id(k), function.instruction_output(k), function.instruction_input(k), k)
+            Instruction(function.instruction_id(k), function.instruction_output(k), function.instruction_input(k), k)
             for k in range(function.n_instructions())
         ]
         parts = [instructions[k : k + SEGMENT] for k in range(0, len(instructions), SEGMENT)]
@@ -251,7 +206,7 @@ class _Translation:
         builder = ir.IRBuilder(segment.append_basic_block("entry"))
         starts_in, starts_out = ([0, *accumulate(sizes)] for sizes in sizes_of(function))
         work = _Work(builder, memory)
-        for operation, run in groupby(part, itemgetter(0)):
+        for operation, run in groupby(part, lambda instruction: instruction.operation):
             instructions = [*run]
             if operation == ca.OP_INPUT and len(instructions) >= MIN_MOVED:
                 entries = [starts_in[i] + entry for _, _, (i, entry), _ in instructions]

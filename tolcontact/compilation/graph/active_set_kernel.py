@@ -1,4 +1,4 @@
-"""Compiled changes of the active set: in all joints at once, or one by one (see search_kernel)."""
+"""Compiled changes of the active set: in all joints at once, or one by one."""
 
 import numpy as np
 

@@ -48,6 +48,15 @@ class FolderResolver:
 
     __getitem__ = get
 
+    def write(self, name: str, data: Any) -> None:
+        raise Refusal("is read only")
+
+    def namespaced(self, namespace: str) -> "FolderResolver":
+        return self
+
+    def keys(self) -> list[str]:
+        return []
+
 
 def read_mesh(path: Path, kind: str) -> Arrays:
     """Return the pieces of a mesh file, joined and in their places, with the `spacing` (3,) of coordinates that it can store.

@@ -20,8 +20,8 @@ from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.realizations import archived_analysis, finished
 from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
 from tolcontact.report.elastic_tables import reactions_of
-from tolcontact.report.html import form_scene
-from tolcontact.report.html.form_scene import MAX_GAPS, Scene, SingleStates
+from tolcontact.report.html.form_scene import MAX_GAPS, SingleStates
+from tolcontact.report.html.station_scenes import Scene, station_poses, stations_of, stations_of_nominal, worst_poses
 from tolcontact.statistics import touching
 
 Packed = dict[str, Any]
@@ -37,7 +37,8 @@ def single_realizations(results: xr.DataTree) -> dict[int, str]:
     done = finished(results)
     measured = results.to_dataset()[terms.MEASURED.name].isel({terms.REALIZATION: slice(done), terms.STATE: terms.CORRECTED})
     reasons: dict[int, str] = {}
-    for measure, values in zip(measured[terms.MEASURE].values, measured.values.T, strict=True):
+    for number, measure in enumerate(measured[terms.MEASURE].values):
+        values = measured.isel({terms.MEASURE: number}).values  # one column at a time, since archives may be large
         order = np.argsort(values, kind="stable")
         order = order[np.isfinite(values[order])]
         for extreme, rows in (("smallest", order), ("largest", order[::-1])):
@@ -154,10 +155,10 @@ def _realizations(results: xr.DataTree, singles: dict[int, str], states: SingleS
 
 def _stations(results: xr.DataTree, states: SingleStates) -> list[Scene]:
     """Return the scenes of stations, with the motions of archived worst cases, then of single realizations."""
-    worst, stations = archived_analysis(results, terms.WORST_CASE), form_scene.stations_of(results)
+    worst, stations = archived_analysis(results, terms.WORST_CASE), stations_of(results)
     for station in stations:
-        if (poses := form_scene.station_poses(results, station["name"], states)) is not None:
-            cases = form_scene.worst_poses(results, station["name"], worst)
+        if (poses := station_poses(results, station["name"], states)) is not None:
+            cases = worst_poses(results, station["name"], worst)
             R, t = (np.concatenate(pair) for pair in zip(cases, poses, strict=True))
             station["motions"] = _motions(R - np.eye(3), t)
     return stations
@@ -178,7 +179,7 @@ def view_of(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) 
     return {
         "parts": [_drawn_part(part, image, is_faulty=part.name in faulty) for part, image in previews.items()],
         "toleranced": feature_lists(assembly, {part: image.mesh for part, image in previews.items()}),
-        "stations": form_scene.stations_of_nominal(nominal),
+        "stations": stations_of_nominal(nominal),
         **packed_marks(marks),
     }
 

@@ -1,6 +1,5 @@
-"""Mirror images of parts, such as left and right doors; and copies of a model whose tolerances are wider."""
+"""Mirror images of parts, such as left and right doors, with all that is declared of these parts alone."""
 
-import copy
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal, get_args
@@ -9,15 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration.contact_pair import MIN_PARTS, ContactPair, Force, Overlap
 from tolcontact.declaration.declarations import expect
-from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.geometry import Elastic
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.part import DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Near
-from tolcontact.declaration.size import Size
-from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import Vector, is_length, script_line
-from tolcontact.errors import nearest_name
 
 Plane = Literal["x", "y", "z"]
 PLANES: tuple[Plane, ...] = get_args(Plane)
@@ -25,7 +20,6 @@ HALF_TURN = 180.0  # degrees
 COMPOSED = (  # declarations that refer to parts and features, and what they consist of
     Feature, Pattern, DatumTargets, Elastic, Location, ThreeTwoOne, Locator, ContactPair, Force, Overlap, Face, Near, Point,
 )  # fmt: skip
-MAX_LISTED = 12  # names in a message
 
 
 @dataclass(frozen=True)
@@ -121,69 +115,11 @@ def mirrored(assembly: Any, parts: Sequence[Part], plane: Plane, names: Sequence
     mirror = MirrorPlane(plane, float(at), names)
     mirror.images.update({part: assembly._add("parts", mirror.part(part)) for part in parts})
     for part in parts:
-        for declared in part.declared:
+        for declared in part._declared:
             added = mirror.images[part].add(mirror.composed(declared))
             if isinstance(declared, Feature | Pattern):
                 mirror.images.update(zip(declared.members, added.members, strict=True))
-    for name, thing in mirror.settings(assembly):
+    for name, thing in list(mirror.settings(assembly)):  # all images are composed before the first is added
         assembly._add(name, thing)
     images = tuple(mirror.images[part] for part in parts)
     return images[0] if len(images) == 1 else images
-
-
-def widened(assembly: Any, factor: float, names: Sequence[str]) -> Any:
-    """Return a copy of an assembly with tolerances `factor` times as wide, about their centres (see Assembly.widened)."""
-    if not (is_length(factor) and factor > 0):
-        raise ValueError(f"widened: factor is {factor!r}; expected a number above 0, such as 1.2")
-    copied = copy.deepcopy(assembly)
-    toleranced = list(_toleranced(copied))
-    owners = dict.fromkeys(name for labels, _ in toleranced for name in labels)
-    if unknown := [name for name in names if name not in owners]:
-        listed = ", ".join(list(owners)[:MAX_LISTED]) or "none"
-        fault = f"no part, locator, feature or variable with a tolerance{nearest_name(unknown[0], owners)}"
-        raise ValueError(f'widened: "{unknown[0]}" is {fault}; these are, for example: {listed}')
-    for labels, thing in toleranced:
-        if not names or not set(labels).isdisjoint(names):
-            name = "tolerances" if isinstance(thing, Feature | Pattern) else "tolerance"
-            value = getattr(thing, name)
-            wider = tuple(_wider(t, factor) for t in value) if isinstance(value, tuple) else _wider(value, factor)
-            for owner in (thing, *vars(thing).get("members", ())):  # the members of a pattern have its tolerances
-                object.__setattr__(owner, name, wider)
-    return copied
-
-
-def _toleranced(assembly: Any) -> Iterator[tuple[list[str], Any]]:
-    """Yield the names of all that has tolerances, and the thing itself."""
-    for location in assembly.locations:
-        if location.tolerance is not None:
-            yield [location.part.name], location
-        for locator in location.locators:
-            if locator.tolerance is not None:
-                yield [location.part.name, f"{location.part.name}.{locator.name}"], locator
-    for feature in (feature for part in assembly.parts for feature in part.toleranced if feature.tolerances):
-        yield [feature.part.name, feature.label], feature
-    for variable in assembly.variables:
-        yield [variable.name], variable
-
-
-def _wider(tolerance: Any, factor: float) -> Any:
-    """Return a tolerance, a size or a control of a feature that is `factor` times as wide, about its centre."""
-    if isinstance(tolerance, GeometricTolerance):
-        outside = None if tolerance.outside is None else factor * tolerance.outside
-        return replace(tolerance, width=factor * tolerance.width, outside=outside)
-    if not isinstance(tolerance.distribution, str):
-        tolerance = replace(tolerance, distribution=_wider_distribution(tolerance.distribution, factor))
-    if isinstance(tolerance, Tolerance):
-        return tolerance if tolerance.range is None else replace(tolerance, range=factor * tolerance.range)
-    assert isinstance(tolerance, Size)
-    middle, half = (tolerance.upper + tolerance.lower) / 2, factor * (tolerance.upper - tolerance.lower) / 2
-    return replace(tolerance, upper=middle + half, lower=middle - half, tolerance_class="")
-
-
-def _wider_distribution(frozen: Any, factor: float) -> Any:
-    """Return a frozen distribution of scipy.stats that is `factor` times as wide, about its median."""
-    shapes, scaling = frozen.args[: frozen.dist.numargs], frozen.args[frozen.dist.numargs :]
-    options = {"loc": 0.0, "scale": 1.0} | dict(zip(("loc", "scale"), scaling, strict=False)) | frozen.kwds
-    median = float(frozen.ppf(0.5))
-    options |= {"loc": median + factor * (options["loc"] - median), "scale": factor * options["scale"]}
-    return frozen.dist(*shapes, **options)

@@ -1,29 +1,21 @@
-"""Checks at the end of a run: certified answers against the surfaces between contact points, and other objectives.
-
-The first realizations are simulated under other objectives, too: by how much results depend on the choice.
-"""
+"""The check of certified answers against the surfaces, between contact points."""
 
 import warnings
-from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.arrays import Array, Float
-from tolcontact.compilation import Program, compile_program
-from tolcontact.errors import ContactWarning, ModelError, OptionError
-from tolcontact.method import OBJECTIVES
-from tolcontact.simulation.block import outcomes, simulate_block
+from tolcontact.compilation import Program
+from tolcontact.errors import ContactWarning
+from tolcontact.simulation.block import simulate_block
 from tolcontact.texts import shown
-from tolcontact.vocabulary import CORRECTED, ArchiveVariable
+from tolcontact.vocabulary import CORRECTED
 
 ON_PLANE_GAP = 1e-6  # mm: a contact point with a smaller gap touches its plane
 ENDED_SHARE = 1 / 2000  # of the smallest tolerance range: at a larger distance from a touching point, its face has ended
 DEFAULT_RANGE = 1.0  # mm: smallest tolerance range if nothing is toleranced
-COMPARED_ROWS = 128
-MIN_COMPARED = 1000  # realizations of a run: the comparison adds some tenths to its time, or less if it is longer
-NOT_SIMULATED = -1  # instead of a status
 
 
 class Surfaces(NamedTuple):
@@ -114,44 +106,3 @@ def _advice(program: Program, k: int) -> str:
 def simulated_poses(program: Program, deviations: Float[Array, "n contributor"]) -> Float[Array, "n part 12"]:
     """Return corrected poses (row, part, 12) of realizations, which are simulated again."""
     return simulate_block(program, deviations).poses[:, CORRECTED]
-
-
-def compared_objectives(program: Program) -> tuple[str, ...]:
-    """Return the objectives that need no force, that of the program first; none without contact, or where forces decide."""
-    objective = program.method.minimizes
-    if objective.presses or not program.groups:
-        return ()
-    return objective.name, *(other.name for other in OBJECTIVES.values() if not other.presses and other != objective)
-
-
-def empty_by_objective(program: Program) -> dict[ArchiveVariable, np.ndarray]:
-    """Return the values by objective before any is simulated; nothing if there is nothing to compare."""
-    count = len(compared_objectives(program))
-    if not count:
-        return {}
-    return {
-        terms.MEASURED_BY_OBJECTIVE: np.full((count, COMPARED_ROWS, len(program.nominal.measures)), np.nan),
-        terms.STATUS_BY_OBJECTIVE: np.full((count, COMPARED_ROWS), NOT_SIMULATED, dtype=np.int8),
-    }
-
-
-def by_objective(
-    program: Program, measured: np.ndarray, statuses: np.ndarray, blocks: Any, seed: int
-) -> dict[ArchiveVariable, np.ndarray]:
-    """Return corrected measures and statuses of the first realizations under each objective.
-
-    measured   (COMPARED_ROWS, measure): under the objective of the program; statuses (COMPARED_ROWS,)
-    blocks     a function with the arguments of `map_blocks`
-    """
-    values = empty_by_objective(program)
-    measured_by, statuses_by = values[terms.MEASURED_BY_OBJECTIVE], values[terms.STATUS_BY_OBJECTIVE]
-    measured_by[0], statuses_by[0] = measured, statuses
-    for k, name in enumerate(compared_objectives(program)[1:], start=1):
-        try:
-            other = compile_program(program.nominal, program.solver.name, program.method.with_choices(objective=name))
-        except (ModelError, OptionError):  # compliant contact needs forces, and some solvers have fewer objectives
-            continue
-        results = list(blocks(outcomes, replace(other, draws=program.draws), samples=COMPARED_ROWS, seed=seed))
-        measured_by[k] = np.concatenate([states[:, CORRECTED] for states, _ in results])
-        statuses_by[k] = np.concatenate([status for _, status in results])
-    return values

@@ -1,21 +1,15 @@
-"""Scans of places that are searched at every pose: of bounded bodies, and of faces with form.
+"""A scan of the places where two bodies can touch, found at given poses."""
 
-Heights of faces with form are summed up once for each realization, not in every pass. The smallest gap of a leaf follows from
-the gaps of its nominal points and its largest height. Planes also touch at local minima of the gap between their points, which
-are searched from the deepest point of each leaf.
-"""
-
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import MANY_SLOTS
-from tolcontact.contact import bounded_kernel, kernel
-from tolcontact.contact.scan import Deepest, FixedScan, Scan
-from tolcontact.discretization import FIRST_POINT, ContactPoints
-from tolcontact.discretization.plane_minima import with_former
+from tolcontact.contact import bounded_kernel
+from tolcontact.contact.scan import Deepest, Scan
+from tolcontact.discretization import FIRST_POINT
 from tolcontact.geometry.kernel import CORNER_ON_FACET
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
@@ -127,88 +121,3 @@ class BoundedScan(Scan):
             return np.zeros(points.shape, dtype=bool)
         at_ends = np.where(points < FIRST_POINT, points, 0)
         return (self.meeting.kinds[at_ends] == CORNER_ON_FACET) & (points < FIRST_POINT)
-
-
-@dataclass(frozen=True, eq=False)
-class RaisedScan(FixedScan):
-    """The points of some of the realizations of a block, with known heights, and `minima` of the gap between the points.
-
-    The lowest points of clusters take the remaining slots, too: faces with form end up on a few points anywhere, and fewer QPs
-    find these points if all sides of the faces have rows from the first QP on.
-    """
-
-    fills = True
-
-    minima: SearchedPlaces = field(kw_only=True)
-
-    def take(self, rows: np.ndarray) -> "RaisedScan":
-        return replace(self, raised=self.raised._replace(rows=self.raised.rows[rows]), minima=self.minima.take(rows))
-
-    def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        is_point, realization = points < FIRST_PLACE, self.raised.rows[:, None]
-        numbers = np.where(is_point, points, 0)
-        P_m, P_r, n_r = (x[numbers] for x in (self.pair.P_m, self.pair.P_r, self.pair.n_r))
-        P_r = P_r - self.raised.points[realization, numbers][..., None] * n_r
-        if not is_point.all():
-            both = zip((P_m, P_r, n_r), self.minima.rows(points), strict=True)
-            P_m, P_r, n_r = (np.where(is_point[..., None], *vectors) for vectors in both)
-        return P_m, P_r, n_r
-
-    def holds(self, points: np.ndarray) -> np.ndarray:
-        return self.minima.holds(points) | (points < FIRST_PLACE)
-
-    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
-        points, gaps = self.deepest_of(self.clusters, relative, deviations, may_carry)
-        if self.minima.labels.shape[1]:
-            points = np.concatenate([points, np.maximum(self.minima.labels, 0)], axis=1)
-            gaps = np.concatenate([gaps, self.minima.gaps(relative)], axis=1)
-        return Deepest(points, -gaps)
-
-    def depth_between(self, relative: np.ndarray) -> np.ndarray:
-        return -self.minima.gaps(relative).min(axis=1, initial=0.0)
-
-    def with_minima(
-        self,
-        pair: ContactPoints,
-        relative: Float[Array, "realization 12"],
-        deviations: Float[Array, "realization contributor"],
-        depth: float,
-        *,
-        is_raw: bool = False,
-        in_steps: bool = False,
-    ) -> "RaisedScan":
-        """Return the scan with the minima of the gap at X_RM that are deeper than `depth` [mm], and those found before.
-
-        In the raw state (`is_raw`) there are none where a point is inside: contact moves these realizations anyway.
-        """
-        assert pair.minima is not None
-        if is_raw:
-            rows = np.flatnonzero(self.min_gap(relative, deviations) >= 0)
-            if not rows.size:
-                return self
-            found = self.take(rows).with_minima(pair, relative[rows], deviations[rows], depth).minima
-            every = SearchedPlaces.none(len(relative), found.labels.shape[1])
-            for values, of_clear in zip(every, found, strict=True):
-                values[rows] = of_clear
-            return replace(self, minima=every)
-        grown, limits = pair.heights(deviations), pair.minima.bulge(deviations)
-        gaps, P_m = self.gaps(relative, deviations, limits), self.pair.P_m[None]
-        labels = pair.minima.find(relative, deviations, grown, P_m, gaps, limits, depth, in_steps=in_steps)
-        labels = with_former(labels, self.minima.labels)
-        if not labels.shape[1]:
-            return replace(self, minima=SearchedPlaces.none(len(relative)))
-        places, heights = pair.minima.at(relative, deviations, labels)
-        return replace(self, minima=SearchedPlaces.of(RaisedPlaces(places, heights + grown[:, None])))
-
-
-def raised_scan(scan: FixedScan, deviations: Float[Array, "realization contributor"], *, always: bool = False) -> Scan:
-    """Return the scan of realizations with deviations; without many heights the same one, unless `always`."""
-    of, count = scan.points, len(deviations)
-    if len(of.columns) < MIN_HEIGHTS and not always:
-        return scan
-    sizes = of.coordinates.shape[1], len(of.leaves) - 1, len(of.branches) - 1
-    points, leaves, branches = (np.empty((count, size)) for size in sizes)
-    raised = kernel.Raised(points, leaves, branches, np.arange(count))
-    slopes, heights = of.coordinates[of.basis.shape[1] :], np.ascontiguousarray(deviations)
-    kernel.sum_heights(of.columns, slopes, of.leaves, of.branches, heights, raised)
-    return RaisedScan(scan.pair, scan.nominal_points, scan.clusters, (), raised, minima=SearchedPlaces.none(count))

@@ -1,0 +1,101 @@
+"""Guards of bounded pairs: they detect bodies that interfere where the list of places shows nothing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact import poses as pose
+from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.compilation import Program
+from tolcontact.geometry.places import Places
+from tolcontact.interference import Neighbours, WayOut, ordered
+
+GUARD = 1 << 41  # first label of places that a guard adds: a label encodes the direction that separates the bodies
+PARTING = 2 * GUARD  # first label of places along which convex bodies part best (see Parting)
+LEVELS = 1 << 12  # of a component of that direction
+APART = 2.0 * 8.0 ** np.arange(3)  # insets of both bodies: the distances at which a place that holds them apart is searched
+
+
+def is_guard(labels: Int[Array, "..."]) -> Bool[Array, "..."]:
+    """Return which labels belong to places that a guard added."""
+    return (labels >= GUARD) & (labels < PARTING)
+
+
+def _label(normals: Float[Array, "n 3"]) -> Int[Array, " n"]:
+    digits = np.round((normals + 1) / 2 * (LEVELS - 1)).astype(np.int64)
+    return GUARD + (digits[:, 0] * LEVELS + digits[:, 1]) * LEVELS + digits[:, 2]
+
+
+def _direction(labels: Int[Array, " n"]) -> Float[Array, "n 3"]:
+    code = labels - GUARD
+    digits = np.stack([code // LEVELS**2, code // LEVELS % LEVELS, code % LEVELS], axis=1)
+    normals = digits / (LEVELS - 1) * 2 - 1
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def no_places(count: int) -> Places:
+    """Return empty places (n, 1)."""
+    return Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
+
+
+@dataclass(frozen=True, eq=False)
+class Guard:
+    """The bodies of a pair as the search moves them: as a whole, with the face that touches.
+
+    is_swapped   whether the moving body is the second one of the neighbours
+    """
+
+    neighbours: Neighbours
+    is_swapped: bool
+
+    @classmethod
+    def of(cls, program: Program, index: int) -> "Guard | None":
+        """Return the guard of a pair; None if its bodies may interfere, have no inside, or grow where they touch."""
+        pair = program.nominal.pairs[index]
+        assert pair.reference is not None
+        if any(face is not None and face.grows for face in pair.deviating):
+            return None
+        bodies = ordered(pair.moving, pair.reference)
+        neighbours = program.watch.neighbours(bodies)
+        return None if neighbours is None else cls(neighbours, pair.moving != bodies[0])
+
+    def interferes(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
+        """Return whether the bodies interfere at X_RM (n,)."""
+        return self.neighbours.interfere(pose.inverse(X_RM) if self.is_swapped else X_RM)
+
+    def places(self, X_RM: Float[Array, "n 12"], labels: Int[Array, " n"]) -> Places:
+        """Return a place (n, 1) that separates the bodies at X_RM where they interfere, or touch; an infinite gap for none.
+
+        labels   (n,) of the places that held the bodies apart before, -1 for none: these bodies touch, or are a little apart
+        """
+        found = no_places(len(X_RM))
+        self._part(found, np.arange(len(X_RM)), X_RM, np.zeros((len(X_RM), 3)))
+        for apart in APART * sum(self.neighbours.insets):
+            rows = np.flatnonzero((found.labels[:, 0] < 0) & (labels >= 0))
+            if rows.size:
+                self._part(found, rows, X_RM, -apart * _direction(labels[rows]))
+        return found
+
+    def _part(self, found: Places, rows: Int[Array, " k"], X_RM: Float[Array, "n 12"], shift: Float[Array, "k 3"]) -> None:
+        """Write the place that separates bodies in some rows, which overlap once the moving one is shifted."""
+        shifted = X_RM[rows]
+        shifted[:, 9:] += shift
+        way = self.ways_out(shifted, -shift)
+        is_known = way.widths > 0
+        rows, way = rows[is_known], WayOut(*(values[is_known] for values in way))
+        arms = np.einsum("nij,nj->ni", pose.rotation(X_RM[rows]), way.places) + pose.translation(X_RM[rows]) - way.feet
+        gaps = (arms * way.normals).sum(axis=1)
+        for values, of_rows in zip(found, (_label(way.normals), gaps, way.places, way.feet, way.normals), strict=True):
+            values[rows, 0] = of_rows
+
+    def ways_out(self, X_RM: Float[Array, "n 12"], directions: Float[Array, "n 3"] | None = None) -> WayOut:
+        """Return how the bodies separate: P_m, P_r and n_r of the paper, and how deep the place P_m lies (n,) [mm].
+
+        directions   (n, 3) of separation, if known (see Neighbours)
+        """
+        if not self.is_swapped:
+            return self.neighbours.ways_out(X_RM, directions)
+        R = pose.rotation(X_RM)
+        given = None if directions is None else -np.einsum("nji,nj->ni", R, directions)
+        way = self.neighbours.ways_out(pose.inverse(X_RM), given)
+        return WayOut(way.feet, way.places, -np.einsum("nij,nj->ni", R, way.normals), way.widths)
