@@ -26,7 +26,8 @@ ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding
 NEARLY_AT_REST = 1e-3  # mm: after a smaller step, places do not stay beyond sharp edges
 MAX_IDLE = 3  # steps in a row that end where they begin, because bodies would penetrate: the next ones hardly ever differ
 OUTLOOK = 4.0  # steps: places with larger gaps are not looked for, since the next step is hardly ever larger than the last
-CLOSED = 1e-6  # mm, and of rotation matrices: steps that return this close to an earlier pose repeat themselves
+CLOSED_SHARE = 1e-4  # of a step: two steps that end this close to where they began repeat themselves
+SMALLEST_STEP = 1e-5  # mm, and of rotation matrices: smaller ones are not compared
 
 
 class Phase(NamedTuple):
@@ -109,14 +110,15 @@ def repeat(
         unrest, residual = np.minimum(size, scaled), unsettled.state.kkt_residual
         residual[~moves] = np.maximum(residual[~moves], unrest[~moves])
         lost = moves & (limits.have_drifted(unsettled.task, unsettled.state, LOST_SIZES) | (idle >= MAX_IDLE))
-        if phase.width > 1 and not phase.newton:
-            lost |= moves & _goes_round(trail, unsettled.state)
-            trail = [*trail[-1:], unsettled.state.poses.copy()]
+        goes_round = moves & ~asleep & _goes_round(trail, unsettled.state)
+        trail = [*trail[-1:], unsettled.state.poses.copy()] if candidates.bounded and not phase.newton else []
+        lost |= goes_round & (phase.width > 1)
+        waits = (goes_round | asleep) & (phase.width == 1)  # for the next phase
         residual[lost] = np.inf
-        moves &= ~lost
+        moves = (moves | waits) & ~lost
         unsettled.settle(~moves)
-        # Realizations that converge while steps are damped need no further damping.
-        asleep = (size[moves] <= STEP_TOLERANCE) & (phase.width > 1)
+        # Realizations that converge while steps are damped need no further damping; steps that go round may be damped.
+        asleep = waits[moves] | ((size[moves] <= STEP_TOLERANCE) & (phase.width > 1))
         unrest, idle, trail = unrest[moves], idle[moves], [poses[moves] for poses in trail]
         progress = None if progress is None else progress.take(moves)
         if not len(unsettled):
@@ -166,11 +168,11 @@ def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, phase: Phase
 
 
 def _goes_round(trail: Sequence[np.ndarray], state: State) -> Bool[Array, " n"]:
-    """Return whether parts without conflict are back at their poses of two steps ago, and not of one step ago (n,)."""
+    """Return whether parts without conflict are nearly back at their poses of two steps ago (n,)."""
     if len(trail) < 2:
         return np.zeros(len(state), dtype=bool)
     two, one = (np.abs(state.poses - poses).reshape(len(state), -1).max(axis=1) for poses in trail)
-    return (two < CLOSED) & (one > 10 * CLOSED) & ~_is_stuck(state)
+    return (two < CLOSED_SHARE * one) & (one > SMALLEST_STEP) & ~_is_stuck(state)
 
 
 def _is_stuck(state: State) -> Bool[Array, " n"]:

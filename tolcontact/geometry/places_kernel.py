@@ -25,6 +25,7 @@ from tolcontact.geometry.vector_kernel import cross, dot, first_from, is_within,
 
 LEVEL = MAX_TILT_SINE - 2 * IN_PLANE  # sine of the angle between planes: edges in one of them rise no further above the other
 MAX_SHEAR = 1.8  # lateral shift of a corner's projection per unit height, where planes face each other
+ZERO = (0.0, 0.0, 0.0)
 EVERYWHERE = (-np.inf, -np.inf, np.inf, np.inf)
 
 
@@ -95,21 +96,34 @@ def _is_over_plane(candidates, plane, body, x, slack):  # type: ignore[no-untype
 
 
 @inlined_uncounted
-def _place(A, B, candidates, s, slack, reach, X, moved):  # type: ignore[no-untyped-def]
-    """Return gap, point, projection and normal of candidate s, which may lie `slack` [mm] outside edges."""
-    corners, lines, back, level = moved
+def _owner(A, B, candidates, s, X):  # type: ignore[no-untyped-def]
+    """Return the corner or edge to which candidate s belongs, at a pose: its start and its vector, which a corner lacks.
+
+    They are in the frame of the body that it may touch.
+    """
+    kind, index_A, index_B = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s]
+    if kind == CORNER_ON_FACET:
+        return move(X, row(A.vertices, index_A)), ZERO
+    if kind == FACET_ON_CORNER:
+        return move_back(X, row(B.vertices, index_B)), ZERO
+    start, end = row_of(A.edges, index_A, 0), row_of(A.edges, index_A, 1)
+    return move(X, start), turn(X, minus(end, start))
+
+
+@inlined_uncounted
+def _place(A, B, candidates, s, slack, reach, X, owner, level):  # type: ignore[no-untyped-def]
+    """Return gap, point, projection and normal of candidate s of an owner, which may lie `slack` [mm] outside edges."""
+    start, vector = owner
     kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     is_level = plane >= 0 and level[plane]
     flat = 0 if plane < 0 else candidates.facing[plane, 0 if kind == CORNER_ON_FACET else 1]
     if kind == EDGE_ON_EDGE:
-        return edge_on_edge(
-            A, B, index_A, index_B, flat, plane, slack, reach, X, row_of(lines, index_A, 0), row_of(lines, index_A, 1)
-        )
+        return edge_on_edge(A, B, index_A, index_B, flat, plane, slack, reach, X, start, vector)
     if kind == CORNER_ON_FACET:
-        results = corner_on_facet(A, B, index_A, index_B, flat, plane, is_level, slack, reach, X, row(corners, index_A))
-        is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 1, row(corners, index_A), slack)
+        results = corner_on_facet(A, B, index_A, index_B, flat, plane, is_level, slack, reach, X, start)
+        is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 1, start, slack)
     else:
-        results = facet_on_corner(A, B, index_A, index_B, flat, plane, is_level, slack, reach, X, row(back, index_B))
+        results = facet_on_corner(A, B, index_A, index_B, flat, plane, is_level, slack, reach, X, start)
         is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 0, results[1], slack)
     return results if is_over else NOWHERE
 
@@ -123,14 +137,13 @@ def _write(results, s, gaps, points, projections, normals):  # type: ignore[no-u
 
 
 @inlined_uncounted
-def _range(A, candidates, s, moved, slack):  # type: ignore[no-untyped-def]
-    """Return the smallest and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
-    corners, lines, back, _ = moved
-    kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
+def _range(A, candidates, s, owner, slack):  # type: ignore[no-untyped-def]
+    """Return the smallest and largest coordinates of the owner of candidate s in the plane that faces it."""
+    start, vector = owner
+    kind, plane = candidates.kinds[s], candidates.planes[s]
     body = 0 if kind == FACET_ON_CORNER else 1
     axis_1, axis_2 = row_of(candidates.frames[plane], body, 0), row_of(candidates.frames[plane], body, 1)
     if kind == EDGE_ON_EDGE:
-        start, vector = row_of(lines, index_A, 0), row_of(lines, index_A, 1)
         low, high, low_2, high_2 = dot(axis_1, start), dot(axis_1, vector), dot(axis_2, start), dot(axis_2, vector)
         return (
             low + min(high, 0.0) - slack, low_2 + min(high_2, 0.0) - slack,
@@ -138,25 +151,22 @@ def _range(A, candidates, s, moved, slack):  # type: ignore[no-untyped-def]
         )  # fmt: skip
     shear = slack
     if kind == FACET_ON_CORNER:
-        x, facet = row(back, index_B), candidates.facing[plane, 0]
-        shear += MAX_SHEAR * abs(dot(row(A.normals, facet), minus(x, row_of(A.facets, facet, 0))))
-    else:
-        x = row(corners, index_A)
-    return dot(axis_1, x) - shear, dot(axis_2, x) - shear, dot(axis_1, x) + shear, dot(axis_2, x) + shear
+        facet = candidates.facing[plane, 0]
+        shear += MAX_SHEAR * abs(dot(row(A.normals, facet), minus(start, row_of(A.facets, facet, 0))))
+    x_1, x_2 = dot(axis_1, start), dot(axis_2, start)
+    return x_1 - shear, x_2 - shear, x_1 + shear, x_2 + shear
 
 
 @inlined_uncounted
-def _lowest(A, B, candidates, s, moved):  # type: ignore[no-untyped-def]
-    """Return the least gap that the corner or edge of candidate s can have to the plane that faces it."""
-    corners, lines, back, _ = moved
-    kind, index_A, index_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
+def _lowest(A, B, candidates, s, owner):  # type: ignore[no-untyped-def]
+    """Return the least gap that the owner of candidate s can have to the plane that faces it."""
+    start, vector = owner
+    kind, plane = candidates.kinds[s], candidates.planes[s]
     flat_A, flat_B = candidates.facing[plane, 0], candidates.facing[plane, 1]
     if kind == FACET_ON_CORNER:  # the gap along the other normal is larger than this distance
-        return dot(row(A.normals, flat_A), minus(row(back, index_B), row_of(A.facets, flat_A, 0)))
+        return dot(row(A.normals, flat_A), minus(start, row_of(A.facets, flat_A, 0)))
     n, foot = row(B.normals, flat_B), row_of(B.facets, flat_B, 0)
-    if kind == CORNER_ON_FACET:
-        return dot(n, minus(row(corners, index_A), foot))
-    return dot(n, minus(row_of(lines, index_A, 0), foot)) + min(dot(n, row_of(lines, index_A, 1)), 0.0)
+    return dot(n, minus(start, foot)) + min(dot(n, vector), 0.0)
 
 
 @inlined_uncounted
@@ -169,7 +179,7 @@ def _motion(ball, X):  # type: ignore[no-untyped-def]
 
 @uncounted
 def _find_at(  # type: ignore[no-untyped-def]
-    A, B, candidates, reach, margins, nearness, overhang, retained, ceiling, X, moved, touching, is_held, gaps, all_points
+    A, B, candidates, reach, margins, nearness, overhang, retained, ceiling, X, level, touching, is_held, gaps, all_points
 ):
     """Write gap, points and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
@@ -181,8 +191,7 @@ def _find_at(  # type: ignore[no-untyped-def]
     nearness      in margins: largest distance of such a contact point from a point where the planes touch
     retained      (k,): indices of the retained candidates, or -1
     ceiling       [mm]: candidates of facing planes with larger gaps are left out, unless their edge reaches below it
-    moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
-                  corners of the reference body in the moving frame, and whether facing planes are level (see corner_on_facet)
+    level         (p,): whether facing planes are level (see corner_on_facet)
     touching      (c,): indices of the candidates that touch
     is_held       (corner,), false: see drop_passed
     gaps          (c,) [mm], initially infinite
@@ -193,16 +202,19 @@ def _find_at(  # type: ignore[no-untyped-def]
     for run in range(candidates.widths.size):
         s, middle, end = candidates.runs[run], candidates.middles[run], candidates.runs[run + 1]
         is_flat = candidates.planes[s] >= 0
-        if is_flat and (motion < candidates.clearances[run] or _lowest(A, B, candidates, s, moved) > ceiling):
+        if motion < candidates.clearances[run]:
             continue
-        low, low_2, high, high_2 = _range(A, candidates, s, moved, margin) if is_flat else EVERYWHERE
+        owner = _owner(A, B, candidates, s, X)
+        if is_flat and _lowest(A, B, candidates, s, owner) > ceiling:
+            continue
+        low, low_2, high, high_2 = _range(A, candidates, s, owner, margin) if is_flat else EVERYWHERE
         while True:
             if s == middle:
                 s = first_from(boxes, middle, end, low - candidates.widths[run])
             if s >= end or (s >= middle and boxes[s, 0] > high):
                 break
             if not (boxes[s, 2] < low or boxes[s, 3] < low_2 or boxes[s, 1] > high_2):
-                _write(_place(A, B, candidates, s, margin, reach, X, moved), s, gaps, points, projections, normals)
+                _write(_place(A, B, candidates, s, margin, reach, X, owner, level), s, gaps, points, projections, normals)
                 if gaps[s] < np.inf:
                     touching[count], count = s, count + 1
             s += 1
@@ -213,7 +225,7 @@ def _find_at(  # type: ignore[no-untyped-def]
     for s in retained:
         if s >= 0 and candidates.planes[s] >= 0 and gaps[s] == np.inf:
             slack = margins[candidates.planes[s]]
-            results = _place(A, B, candidates, s, slack, reach, X, moved)
+            results = _place(A, B, candidates, s, slack, reach, X, _owner(A, B, candidates, s, X), level)
             if results[0] < np.inf and is_near(
                 candidates, s, results[2], projections, touching[:strict], gaps, nearness * slack
             ):
@@ -223,16 +235,8 @@ def _find_at(  # type: ignore[no-untyped-def]
 
 
 @uncounted
-def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-untyped-def]
-    """Write the moved geometry at a pose X_RM (12,), see `moved` in _find_at, and sines of the angles between facing planes."""
-    for j in range(corners.shape[0]):
-        corners[j, 0], corners[j, 1], corners[j, 2] = move(X, row(A.vertices, j))
-    for j in range(lines.shape[0]):
-        start, end = row_of(A.edges, j, 0), row_of(A.edges, j, 1)
-        lines[j, 0, 0], lines[j, 0, 1], lines[j, 0, 2] = move(X, start)
-        lines[j, 1, 0], lines[j, 1, 1], lines[j, 1, 2] = turn(X, minus(end, start))
-    for j in range(back.shape[0]):
-        back[j, 0], back[j, 1], back[j, 2] = move_back(X, row(B.vertices, j))
+def _sines(A, B, facing, X, sines):  # type: ignore[no-untyped-def]
+    """Write sines of the angles between facing planes at a pose X_RM (12,)."""
     for j in range(facing.shape[0]):
         across = cross(turn(X, row(A.normals, facing[j, 0])), row(B.normals, facing[j, 1]))
         sines[j] = math.sqrt(dot(across, across))
@@ -241,24 +245,23 @@ def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-unty
 @uncounted
 def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, ceilings, directions, results, scratch):  # type: ignore
     """Write the results of `find`: labels, gaps, points, projections and normals. Return the largest number of points."""
-    corners, lines, back, level, margins, touching, is_held, is_chosen, all_gaps, all_points = scratch
+    level, margins, touching, is_held, is_chosen, all_gaps, all_points = scratch
     labels, gaps, points, projections, normals = results
     points_at, projections_at, normals_at = all_points
     facing, largest = candidates.facing, 0
     for k in range(poses.shape[0]):
         X = poses[k]
-        _move(A, B, facing, X, corners, lines, back, margins)
+        _sines(A, B, facing, X, margins)
         margins[-1] = margin
         for j in range(facing.shape[0]):
             level[j] = margins[j] < LEVEL
             margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
-        moved = (corners, lines, back, level)
         number, ceiling = 0, ceilings[k]
         while True:
             for s in touching[:number]:
                 all_gaps[s] = np.inf
             number = _find_at(
-                A, B, candidates, reach, margins, error[2], error[3], retained[k], ceiling, X, moved, touching, is_held,
+                A, B, candidates, reach, margins, error[2], error[3], retained[k], ceiling, X, level, touching, is_held,
                 all_gaps, all_points,
             )  # fmt: skip
             if ceiling == np.inf or least(touching[:number], all_gaps) <= ceiling:
@@ -306,7 +309,6 @@ def find(  # type: ignore[no-untyped-def]
     """
     count = candidates.kinds.size
     scratch = (
-        np.empty(A.vertices.shape), np.empty(A.edges.shape), np.empty(B.vertices.shape),
         np.empty(candidates.facing.shape[0], dtype=np.bool_),
         np.empty(candidates.facing.shape[0] + 1), np.empty(count, dtype=np.int64),
         np.zeros(A.vertices.shape[0] + B.vertices.shape[0], dtype=np.bool_), np.zeros(count, dtype=np.bool_),

@@ -292,28 +292,32 @@ def _passes_listed(side, f, p, q, start, end, shares, senses):  # type: ignore[n
 
 
 @uncounted
-def _passes_any(owner, target, X, is_forward, motion, shares, senses):  # type: ignore[no-untyped-def]
-    """Return whether an edge of a body passes the surface of the other one."""
+def _passes_any(owner, target, X, is_forward, motion, deviation, shares, senses):  # type: ignore[no-untyped-def]
+    """Return whether an edge of a body passes the surface of the other one; a pose and deviations move points by [mm] at most."""
+    motion += deviation
     is_listed = motion <= owner.reach
     for j in range(near_count(owner.distances, motion)):
-        if is_listed and (owner.starts[j] == owner.starts[j + 1] or owner.reaches[owner.starts[j]] > motion):
+        first, last = owner.starts[j], owner.starts[j + 1]
+        if is_listed and (first == last or owner.reaches[first] > motion):
             continue
-        p, q = vertex(owner, owner.edges[j, 0]), vertex(owner, owner.edges[j, 1])
-        p, q = (move(X, p), move(X, q)) if is_forward else (move_back(X, p), move_back(X, q))
+        start, end = vertex(owner, owner.edges[j, 0]), vertex(owner, owner.edges[j, 1])
+        p, q = (move(X, start), move(X, end)) if is_forward else (move_back(X, start), move_back(X, end))
         if misses(target.boxes, 0, p, q):
             continue
         if not is_listed:
             if passes(target, p, q, shares, senses) > 0:
                 return True
             continue
-        for m in range(owner.starts[j], owner.starts[j + 1]):
-            if owner.reaches[m] > motion:
+        step_p, step_q = minus(p, start), minus(q, end)  # no point of an edge moves further than both of its ends
+        nearest = min(motion, deviation + math.sqrt(max(dot(step_p, step_p), dot(step_q, step_q))))
+        for m in range(first, last):
+            if owner.reaches[m] > nearest:
                 break
             # Before the call, which copies the arrays of the body and takes ten times as long.
-            start, end = _heights(target, owner.listed[m], p, q)
-            if start * end > 0.0 or start == end:
+            height_p, height_q = _heights(target, owner.listed[m], p, q)
+            if height_p * height_q > 0.0 or height_p == height_q:
                 continue
-            if _passes_listed(target, owner.listed[m], p, q, start, end, shares, senses):
+            if _passes_listed(target, owner.listed[m], p, q, height_p, height_q, shares, senses):
                 return True
     return False
 
@@ -327,12 +331,12 @@ def interfere(A, B, poses, interferes):  # type: ignore[no-untyped-def]
     shares, senses = np.empty(1), np.empty(1, dtype=np.int64)
     for k in range(poses.shape[0]):
         X = poses[k]
-        motion = motion_of(X, A.bounds) + 2.0 * (deviate(A, k) + deviate(B, k))
+        motion, deviation = motion_of(X, A.bounds), 2.0 * (deviate(A, k) + deviate(B, k))
         interferes[k] = (
-            _passes_any(A, B, X, True, motion, shares, senses)
-            or _passes_any(B, A, X, False, motion, shares, senses)
-            or _holds(A, B, X, True, motion)
-            or _holds(B, A, X, False, motion)
+            _passes_any(A, B, X, True, motion, deviation, shares, senses)
+            or _passes_any(B, A, X, False, motion, deviation, shares, senses)
+            or _holds(A, B, X, True, motion + deviation)
+            or _holds(B, A, X, False, motion + deviation)
         )
 
 
