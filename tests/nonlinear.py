@@ -67,7 +67,8 @@ class TrueProblem:
         """1/2 sum of squared displacements: of the points that count, and of all points as small balls; their numbers."""
         motion, held, count, points = 0, 0, 0, 0
         for pair, weight in zip(self.nominal.pairs, weights, strict=True):
-            regions = pair.regions if self.objective == "all points" and pair.samples_faces else (None, None)
+            counts_faces = self.objective == "all points" and pair.samples_faces
+            regions = (pair.moving_region, pair.reference_region) if counts_faces else (None, None)
             for part, P, region in zip((pair.moving, pair.reference), (pair.P_m, pair.P_r), regions, strict=True):
                 if part in self.free:
                     squares = ca.sum1((at(new, part, P) - at(raw, part, P)) ** 2)

@@ -50,8 +50,9 @@ def counted(program: tc.Program, objective: str, raw: Poses) -> list[Moments]:
     found = []
     for pair in program.nominal.pairs:
         assert pair.reference is not None
-        if objective == ALL and all(region is not None for region in pair.regions):
-            sides = [(region.places, region.shares) for region in pair.regions if region is not None]
+        regions = [region for region in (pair.moving_region, pair.reference_region) if region is not None]
+        if objective == ALL and len(regions) == 2:
+            sides = [(region.places, region.shares) for region in regions]
         else:
             is_active = np.ones(len(pair.P_m)) if objective == ALL else gaps(pair, raw) < ACTIVE_GAP
             sides = [(points, pair.weights * is_active) for points in (pair.P_m, pair.P_r)]

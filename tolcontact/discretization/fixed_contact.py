@@ -15,7 +15,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.discretization.form_points import COVER_SHARE, PairForm, form_lengths, form_spacing
 from tolcontact.discretization.plane_minima import PlaneMinima
-from tolcontact.discretization.point_weights import CountedRegion, counted_regions, point_weights
+from tolcontact.discretization.point_weights import CountedRegion, counted_region, point_weights
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
 from tolcontact.features.zone_kernel import sum_modes
@@ -296,9 +296,14 @@ class ContactPoints:
         return point_weights(self.P_m, self.P_r, self.moving_face, self.reference_face)
 
     @cached_property
-    def regions(self) -> tuple[CountedRegion | None, CountedRegion | None]:
-        """The parts of the moving and of the reference face that an objective counts."""
-        return counted_regions(self.moving_face, self.reference_face, self.within)
+    def moving_region(self) -> CountedRegion | None:
+        """The part of the moving face that an objective counts."""
+        return counted_region(self.moving_face, self.reference_face, self.within)
+
+    @cached_property
+    def reference_region(self) -> CountedRegion | None:
+        """The part of the reference face that an objective counts."""
+        return counted_region(self.reference_face, self.moving_face, self.within)
 
     @cached_property
     def bulge(self) -> float:

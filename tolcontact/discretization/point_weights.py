@@ -38,19 +38,13 @@ class CountedRegion(NamedTuple):
         return float(self.shares.sum())
 
 
-def counted_regions(
-    moving: Surface | None, reference: Surface | None, within: float
-) -> tuple[CountedRegion | None, CountedRegion | None]:
-    """Return the parts of both faces of a pair that an objective counts; None without faces, or if there is no such part.
+def counted_region(face: Surface | None, target: Surface | None, within: float) -> CountedRegion | None:
+    """Return the part of a face that an objective counts; None without faces, or if there is no such part.
 
-    A face counts where it is over the other one, along the normals of the other one, and faces it `within` a distance [mm].
+    It is over the target, along the normals of the target, and faces it `within` a distance [mm].
     """
-    if moving is None or reference is None:
-        return None, None
-    return _counted_region(moving, reference, within), _counted_region(reference, moving, within)
-
-
-def _counted_region(face: Surface, target: Surface, within: float) -> CountedRegion | None:
+    if face is None or target is None:
+        return None
     elements = _exact_elements(face, target, within) or _elements(MOST_POINTS, within, face, target, by_cosines=True)
     return None if elements is None else _region(elements, face)
 

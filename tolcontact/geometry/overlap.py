@@ -127,16 +127,19 @@ def opposite(face: Surface, target: Surface, within: float) -> tuple[np.ndarray,
     """
     corners, normals = np.asarray(face.mesh.triangles), np.asarray(face.mesh.face_normals)
     target_corners, target_normals = np.asarray(target.mesh.triangles), np.asarray(target.mesh.face_normals)
-    rows, columns = _overlapping(corners, target_corners, within * target_normals[:, None])
+    boxes = _swept_boxes(target_corners, within * target_normals[:, None])
+    rows, columns = _overlapping(corners, *boxes)
     if len(rows) > MAX_PAIRS:
         return None
     cosines = -(normals[rows] * target_normals[columns]).sum(axis=1)
     rows, columns, cosines = (values[cosines > FACING] for values in (rows, columns, cosines))
     tie = TIE * float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
-    pairs = _Pairs(target_corners[columns], target_normals[columns], tie)
+    inward = np.cross(target_normals[:, None], np.roll(target_corners, -1, axis=1) - target_corners)
+    inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-300)
+    pairs = _Pairs(*(values[columns] for values in (target_corners, target_normals, inward, *boxes)), tie)
     pieces, pair = corners[rows], np.arange(len(rows))
     for k in range(3):
-        pieces, pair = _above(pieces, pair, pairs.edge_distances(pair, pieces)[:, k])
+        pieces, pair = _above(pieces, pair, pairs.edge_distances(pair, pieces, k))
     for sign, limit in ((1, BEHIND * within), (-1, within)):
         pieces, pair = _above(pieces, pair, limit + sign * pairs.heights(pair, pieces))
     least = MIN_AREA * face.mesh.area
@@ -152,25 +155,29 @@ def opposite(face: Surface, target: Surface, within: float) -> tuple[np.ndarray,
 class _Pairs(NamedTuple):
     """Pairs of a triangle and a target triangle that face each other.
 
-    corners   (pair, 3, 3) [mm] of the target triangles, and their `normals` (pair, 3)
+    corners   (pair, 3, 3) [mm] of the target triangles, with their `normals` (pair, 3)
+    inward    (pair, edge, 3): unit normals of the edges of the target triangles in their planes
+    lower, upper   (pair, 3) [mm]: boxes of the target triangles and what counts in front of and behind them
     tie       [mm]: smaller distances count as 0
     """
 
     corners: np.ndarray
     normals: np.ndarray
+    inward: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
     tie: float
 
     def heights(self, pair: np.ndarray, pieces: np.ndarray) -> np.ndarray:
         """Return the distances (piece, 3) [mm] of the corners of pieces from the target planes of pairs (piece,)."""
-        heights = np.einsum("pck,pk->pc", pieces - self.corners[pair, None, 0], self.normals[pair])
-        return np.where(np.abs(heights) <= self.tie, 0.0, heights)
+        return self._distances(pieces, self.corners[pair, 0], self.normals[pair])
 
-    def edge_distances(self, pair: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-        """Return how far (piece, edge, 3) [mm] the corners of pieces are inside the edges of the target triangles."""
-        starts = self.corners[pair]
-        inward = np.cross(self.normals[pair, None], np.roll(starts, -1, axis=1) - starts)
-        inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-300)
-        distances = np.einsum("peck,pek->pec", pieces[:, None] - starts[:, :, None], inward)
+    def edge_distances(self, pair: np.ndarray, pieces: np.ndarray, k: int) -> np.ndarray:
+        """Return how far (piece, 3) [mm] the corners of pieces are inside edge k of the target triangles."""
+        return self._distances(pieces, self.corners[pair, k], self.inward[pair, k])
+
+    def _distances(self, pieces: np.ndarray, feet: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        distances = np.einsum("pck,pk->pc", pieces - feet[:, None], normals)
         return np.where(np.abs(distances) <= self.tie, 0.0, distances)
 
     def nearest(self, pieces: np.ndarray, pair: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
@@ -204,17 +211,23 @@ class _Pairs(NamedTuple):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the parts of pieces where the target triangles of `others` (piece,) are not nearer, and their indices."""
 
-        def margins(rows: np.ndarray, parts: np.ndarray) -> np.ndarray:
+        def margins(rows: np.ndarray, parts: np.ndarray, k: int) -> np.ndarray:
+            if k < 3:
+                return self.edge_distances(others[rows], parts, k)
             own, other = side[rows, None] * self.heights(pair[rows], parts), self.heights(others[rows], parts)
-            limits = np.stack([own - other, own + other], axis=1)
-            limits[np.abs(limits) <= self.tie] = 0.0
-            return np.concatenate([self.edge_distances(others[rows], parts), limits], axis=1)
+            margin = own - other if k == 3 else own + other
+            return np.where(np.abs(margin) <= self.tie, 0.0, margin)
 
         source = np.arange(len(pieces))
-        is_covered = (margins(source, pieces).max(axis=2) > 0).all(axis=1) & (others != pair)
+        low, high = pieces.min(axis=1) - self.tie, pieces.max(axis=1) + self.tie
+        near = np.flatnonzero(((low <= self.upper[others]) & (high >= self.lower[others])).all(axis=1) & (others != pair))
+        for k in range(5):
+            near = near[margins(near, pieces[near], k).max(axis=1) > 0]
+        is_covered = np.zeros(len(pieces), dtype=bool)
+        is_covered[near] = True
         outside, inside, rows = [(pieces[~is_covered], source[~is_covered])], pieces[is_covered], source[is_covered]
         for k in range(5):
-            values = margins(rows, inside)[:, k]
+            values = margins(rows, inside, k)
             below = (values < 0).any(axis=1)
             outside.append(_above(inside[below], rows[below], -values[below]))
             inside, rows = _above(inside, rows, values)
@@ -222,13 +235,17 @@ class _Pairs(NamedTuple):
         return parts, sources
 
 
-def _overlapping(corners: np.ndarray, target_corners: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of the pairs of triangles (triangle, 3, 3) with overlapping boxes; stops beyond MAX_PAIRS of them.
+def _swept_boxes(corners: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the boxes (triangle, 3) of triangles (triangle, 3, 3) [mm] moved by their `reach` (triangle, 1, 3), both ways."""
+    swept = np.concatenate([corners - reach, corners + reach], axis=1)
+    return swept.min(axis=1), swept.max(axis=1)
 
-    The box of a target triangle holds it moved by its `reach` (triangle, 1, 3) [mm], both ways.
+
+def _overlapping(corners: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pairs of triangles (triangle, 3, 3) with boxes that overlap those from `lower` to `upper` (target, 3).
+
+    They are two arrays of indices, which stop beyond MAX_PAIRS.
     """
-    swept = np.concatenate([target_corners - reach, target_corners + reach], axis=1)
-    lower, upper = swept.min(axis=1), swept.max(axis=1)
     low, high = corners.min(axis=1), corners.max(axis=1)
     rows, columns, count = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], 0
     for first in range(0, len(corners), BLOCK_TRIANGLES):

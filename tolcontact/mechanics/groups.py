@@ -233,7 +233,7 @@ def _points_near(
 
 def _area(pair: ContactPoints) -> float:
     """Return the area [mm^2] of the moving face that counts; 0 without faces, or if no part is opposite to the other face."""
-    return 0.0 if pair.regions[0] is None else pair.regions[0].area
+    return 0.0 if pair.moving_region is None else pair.moving_region.area
 
 
 def _points_per_area(pairs: Sequence[ContactPoints]) -> float:
@@ -264,7 +264,7 @@ def _side(
     weights, face_moments = pair.weights if method.is_exact else np.ones(len(points)), None
     if method.counts_faces and _area(pair) > 0:
         weights = weights * (_area(pair) * density / len(points))
-        region = pair.regions[0 if of_moving else 1]
+        region = pair.moving_region if of_moving else pair.reference_region
         if region is not None and pair.samples_faces:
             face_moments = moment_table(region.places, centre) @ region.shares * density
     all_moments = (moment_table(points, centre) * weights).sum(axis=1) if face_moments is None else face_moments.copy()
