@@ -136,7 +136,8 @@ def opposite(face: Surface, target: Surface, within: float) -> tuple[np.ndarray,
     tie = TIE * float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
     inward = np.cross(target_normals[:, None], np.roll(target_corners, -1, axis=1) - target_corners)
     inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-300)
-    pairs = _Pairs(*(values[columns] for values in (target_corners, target_normals, inward, *boxes)), tie)
+    lower, upper = (box[columns] for box in boxes)
+    pairs = _Pairs(target_corners[columns], target_normals[columns], inward[columns], lower, upper, tie)
     pieces, pair = corners[rows], np.arange(len(rows))
     for k in range(3):
         pieces, pair = _above(pieces, pair, pairs.edge_distances(pair, pieces, k))

@@ -59,7 +59,7 @@ def check_affordable(program: Program, *, samples: int, seed: int, threads: int,
 
 def _checked_seconds(program: Program, samples: int, seed: int, threads: int) -> float:
     """Return the time [s] that `samples` realizations need on `threads` threads. Raises OptionError above 30 days."""
-    seconds = _seconds_per_realization(program, seed) / threads
+    seconds = _seconds_per_realization(program, samples, seed) / threads
     if seconds * samples > MAX_SECONDS:
         raise OptionError(
             f"{samples} realizations would take about {duration(seconds * samples)}; ask for at most "
@@ -68,15 +68,19 @@ def _checked_seconds(program: Program, samples: int, seed: int, threads: int) ->
     return seconds * samples
 
 
-def _seconds_per_realization(program: Program, seed: int) -> float:
-    """Return the time per realization [s], from trials of growing size, at most a block."""
+def _seconds_per_realization(program: Program, samples: int, seed: int) -> float:
+    """Return the time per realization [s], from trials of growing size, at most a block.
+
+    Small trials overestimate it: they suffice if `samples` realizations are quick nevertheless.
+    """
     trial = FIRST_TRIAL_ROWS
     list(simulate_blocks(program, samples=trial, seed=seed, threads=1))  # loading takes longer than a block
     while True:
         started = time.perf_counter()
         list(simulate_blocks(program, samples=trial, seed=seed, threads=1))
         seconds = time.perf_counter() - started
-        if seconds > MIN_TRIAL_SECONDS or trial >= block_rows(program):
+        is_quick = seconds / trial * samples < MIN_ANNOUNCED_SECONDS
+        if is_quick or seconds > MIN_TRIAL_SECONDS or trial >= block_rows(program):
             return seconds / trial
         trial *= 8
 
