@@ -10,21 +10,20 @@ import sys
 import threading
 from pathlib import Path
 
-import tolcontact as tc
 from tests import cases
 from tests.cases import stations
-from tests.helpers import contents
+from tests.helpers import compiled, contents
 from tolcontact.archive import Run, locked_archive
 from tolcontact.workflow.runs import write_archive
 
 folder, step = Path(sys.argv[1]), int((*sys.argv, 1)[2])
 whole = folder / "whole.nc"
 CHECKPOINT = 4096  # realizations from one to the next
-program = tc.build(stations.rail() if "stations" in sys.argv else cases.stack(), solver="daqp")
+program = compiled(stations.rail() if "stations" in sys.argv else cases.one_dimensional(2), solver="daqp")
 
 
 WRITERS = ("archive/writer.py", "archive/journal.py", "archive/variables.py", "tolcontact/replacing.py")
-settings = Run(seed=3, samples=9000, keep="measures", surfaces=4, fields="some", checkpoint_interval=0.0)
+settings = Run(seed=3, samples=8200, keep="measures", surfaces=4, fields="some", checkpoint_interval=0.0)
 
 
 def die_at(write):

@@ -5,10 +5,11 @@ import sys
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import compiled
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
 try:
-    tc.run(cases.stack(), samples=20_000, seed=3, solver="daqp", out=sys.argv[1])
+    tc.run(compiled(cases.stack()), samples=9000, seed=3, out=sys.argv[1])
 except tc.errors.ArchiveError as error:
     assert "cannot be written" in str(error), error
     sys.exit(7)

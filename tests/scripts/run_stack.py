@@ -8,6 +8,7 @@ import sys
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import compiled
 
 parser = argparse.ArgumentParser()
 parser.add_argument("archive")
@@ -23,6 +24,5 @@ def tell(rows):
         sys.stdin.readline()
 
 
-tc.run(
-    cases.stack(), samples=options.samples, seed=3, solver="daqp", out=options.archive, keep=options.keep, progress=tell
-).close()
+program = compiled(cases.stack())
+tc.run(program, samples=options.samples, seed=3, out=options.archive, keep=options.keep, progress=tell).close()
