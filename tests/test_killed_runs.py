@@ -21,21 +21,21 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def program():
-    return compiled(cases.stack())
+    return compiled(cases.one_dimensional(2))
 
 
 @pytest.fixture(scope="module")
 def whole(program, tmp_path_factory):
-    """The archive of a run of 9000 realizations that nothing ended."""
+    """The archive of a run of 12 000 realizations that nothing ended."""
     path = tmp_path_factory.mktemp("whole") / "whole.nc"
-    tc.run(program, samples=9000, seed=3, out=path).close()
+    tc.run(program, samples=12_000, seed=3, out=path).close()
     return path
 
 
-@pytest.mark.parametrize(("samples", "after", "keep"), [(9000, 4096, "all"), *nightly((20_000, 12_000, "measures"))])
+@pytest.mark.parametrize(("samples", "after", "keep"), [(12_000, 4096, "all"), *nightly((20_000, 12_000, "measures"))])
 def test_a_killed_run_keeps_its_rows_and_goes_on(samples, after, keep, program, whole, tmp_path):
     path = tmp_path / "killed.nc"
-    with start(script("run_stack", path, samples, "--keep", keep)) as begun:
+    with start(script("run_blocks", path, samples, "--keep", keep)) as begun:
         for line in begun.stdout:
             if int(line) >= after:
                 break
@@ -50,16 +50,14 @@ def test_a_killed_run_keeps_its_rows_and_goes_on(samples, after, keep, program, 
     if keep != "all":
         whole = tmp_path / "whole.nc"
         tc.run(program, samples=samples, seed=3, out=whole, keep=keep).close()
-    for group in (None, "sample", "contact", "field/middle"):
+    for group in (None, "sample", "contact", "field/block"):
         assert contents(path, group).identical(contents(whole, group)), group
 
 
 def test_a_journal_that_was_damaged_is_refused_and_left_alone(program, tmp_path):
     path = tmp_path / "killed.nc"
-    with start(script("run_stack", path, 9000)) as begun:
-        for line in begun.stdout:
-            if int(line) >= 4096:
-                break
+    with start(script("run_blocks", path, 8000, "--step")) as begun:
+        begun.stdout.readline()  # there is a checkpoint: no whole block will follow
         begun.kill()
     rows, checkpoint = (path.with_name(f".killed.nc.{name}") for name in ("rows", "checkpoint"))
     whole, state = rows.read_bytes(), checkpoint.read_bytes()
@@ -76,12 +74,12 @@ def test_a_journal_that_was_damaged_is_refused_and_left_alone(program, tmp_path)
         checkpoint.write_bytes(its_state)
         before = {file.name: file.read_bytes() for file in (path, rows, checkpoint) if file.exists()}
         with pytest.raises(ArchiveError, match=r'is damaged: it has realizations .* delete "\.killed\.nc\.rows" and'):
-            tc.run(program, samples=9000, seed=3, out=path, resume=True)
+            tc.run(program, samples=8000, seed=3, out=path, resume=True)
         assert {file.name: file.read_bytes() for file in (path, rows, checkpoint) if file.exists()} == before
     for file in (rows, checkpoint):
         file.unlink()
     with tc.run(program, samples=200, seed=3, out=path, resume=True) as results:
-        assert results.sizes["realization"] == 9000
+        assert results.sizes["realization"] == 8000
 
 
 @pytest.mark.parametrize("step", [1200, *nightly(15)])
@@ -93,7 +91,7 @@ def test_a_run_may_be_killed_at_any_of_its_writes(step, tmp_path):
 @pytest.mark.parametrize("how", ["resume", *nightly("overwrite")])
 def test_an_archive_is_not_taken_from_the_run_that_writes_it(how, program, tmp_path):
     path = tmp_path / "live.nc"
-    with start(script("run_stack", path, 1000, "--step")) as begun:
+    with start(script("run_blocks", path, 1000, "--step")) as begun:
         begun.stdout.readline()
         with pytest.raises(ArchiveError, match="being written by another run"):
             tc.run(program, samples=1000, seed=3, out=path, **{how: True})
@@ -107,7 +105,7 @@ def test_an_archive_is_not_taken_from_the_run_that_writes_it(how, program, tmp_p
 def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(program, whole, tmp_path):
     path = tmp_path / "full.nc"
     assert run(script("run_on_a_full_disk", path)).returncode == 7
-    tc.run(program, samples=9000, seed=3, out=path, resume=True).close()
+    tc.run(program, samples=12_000, seed=3, out=path, resume=True).close()
     assert contents(path).identical(contents(whole))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["full.nc"]
 

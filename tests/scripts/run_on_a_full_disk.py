@@ -9,7 +9,7 @@ from tests.helpers import compiled
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
 try:
-    tc.run(compiled(cases.stack()), samples=9000, seed=3, out=sys.argv[1])
+    tc.run(compiled(cases.one_dimensional(2)), samples=12_000, seed=3, out=sys.argv[1])
 except tc.errors.ArchiveError as error:
     assert "cannot be written" in str(error), error
     sys.exit(7)

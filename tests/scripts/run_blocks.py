@@ -1,6 +1,6 @@
-"""Run the stack of plates into an archive, and say after each block how many realizations are finished.
+"""Run two blocks into an archive, and say after each block how many realizations are finished.
 
-run_stack.py ARCHIVE SAMPLES [--keep KEPT] [--step]; with --step it goes on when a line is read.
+run_blocks.py ARCHIVE SAMPLES [--keep KEPT] [--step]; with --step it goes on when a line is read.
 """
 
 import argparse
@@ -24,5 +24,5 @@ def tell(rows):
         sys.stdin.readline()
 
 
-program = compiled(cases.stack())
+program = compiled(cases.one_dimensional(2))
 tc.run(program, samples=options.samples, seed=3, out=options.archive, keep=options.keep, progress=tell).close()
