@@ -98,14 +98,18 @@ def forked_reader():
     """Archives are inspected by forks of one process, where a test does not change the environment."""
     from tests.forked_reader import ForkedReader  # noqa: PLC0415  (the hook must be there first)
 
-    reader, run = ForkedReader(), subprocess.run
+    reader, popen = ForkedReader(), subprocess.Popen
 
-    def run_or_fork(command, *arguments, **options):
-        return reader.run(command) if reader.reads(command, options) else run(command, *arguments, **options)
+    class ProcessOrFork(popen):
+        """A process, or what a fork has already answered."""
 
-    subprocess.run = run_or_fork
+        def __new__(cls, command, *arguments, **options):
+            is_read = cls is ProcessOrFork and reader.reads(command, options)
+            return reader.answer(command) if is_read else super().__new__(cls)
+
+    subprocess.Popen = ProcessOrFork
     yield reader
-    subprocess.run = run
+    subprocess.Popen = popen
     reader.close()
 
 

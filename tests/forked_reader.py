@@ -8,6 +8,7 @@ import os
 import subprocess
 import threading
 from pathlib import Path
+from typing import NamedTuple
 
 from tests.helpers import script
 from tolcontact.child import environment
@@ -15,8 +16,25 @@ from tolcontact.child import environment
 OWN = ("PYTEST_CURRENT_TEST", "PYTHONPATH")  # variables that may differ without a difference to the reader
 
 
+class Answer(NamedTuple):
+    """A process that has ended, as far as somebody who waits for its end looks at it."""
+
+    returncode: int
+    output: bytes
+    errors: bytes
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def communicate(self):
+        return self.output, self.errors
+
+
 class ForkedReader:
-    """Runs Python files as `subprocess.run` does, in the environment of the first call."""
+    """Runs Python files as `subprocess.Popen` does, in the environment of the first call."""
 
     def __init__(self):
         self._process, self._lock = None, threading.Lock()
@@ -29,14 +47,14 @@ class ForkedReader:
         is_inspection = isinstance(command, list) and len(command) > 3 and str(command[2]).endswith("archive/inspection.py")
         return is_inspection and shared(options.get("env") or {}) == self._environment
 
-    def run(self, command):
+    def answer(self, command):
         with self._lock:
             if self._process is None:
                 pipes = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE)
                 self._process = subprocess.Popen(script("forking_reader"), env=environment(), text=True, **pipes)
             print(json.dumps([str(Path.cwd()), *map(str, command[2:])]), file=self._process.stdin, flush=True)
             code, out, err = json.loads(self._process.stdout.readline())
-        return subprocess.CompletedProcess(command, code, out.encode("latin-1"), err.encode("latin-1"))
+        return Answer(code, out.encode("latin-1"), err.encode("latin-1"))
 
     def close(self):
         if self._process is not None:

@@ -1,6 +1,5 @@
 """Archives that were damaged, or made to mislead: one message, and nothing else happens."""
 
-import subprocess
 from pathlib import Path
 
 import netCDF4
@@ -11,7 +10,7 @@ import xarray as xr
 
 import tolcontact as tc
 from models import ra1
-from tests.helpers import COMMAND, call, model_in, nightly, run, script
+from tests.helpers import COMMAND, call, model_in, nightly, posix_only, run, script
 from tests.hostile import HOSTILE, make
 from tolcontact import vocabulary
 from tolcontact.errors import ArchiveError
@@ -43,15 +42,15 @@ def program():
 @pytest.fixture
 def once(forked_reader, monkeypatch):
     """A file that has not changed is inspected once."""
-    answers = {}
+    answers, answer = {}, forked_reader.answer
 
-    def answer(command, **_):
+    def answer_once(command):
         question = (*command, Path(command[-3]).read_bytes())
         if question not in answers:
-            answers[question] = forked_reader.run(command)
+            answers[question] = answer(command)
         return answers[question]
 
-    monkeypatch.setattr(subprocess, "run", answer)
+    monkeypatch.setattr(forked_reader, "answer", answer_once)
 
 
 @pytest.mark.slow
@@ -173,6 +172,14 @@ def test_things_may_be_called_like_dimensions_of_the_archive(name, tmp_path):
         assert set(groups) == {name, f"{name}_"} and len(set(groups.values())) == 2
     assert str(model_in(path)) == str(a)
     tc.run(a, samples=200, solver="daqp", out=path, resume=True).close()
+
+
+@posix_only
+def test_archives_are_inspected_by_forks_in_these_tests(good, forked_reader, monkeypatch):
+    asked, answer = [], forked_reader.answer
+    monkeypatch.setattr(forked_reader, "answer", lambda command: asked.append(command) or answer(command))
+    model_in(good)
+    assert asked
 
 
 def test_a_file_that_is_no_archive_is_refused_with_what_is_expected(tmp_path):
