@@ -95,22 +95,27 @@ def archive(tmp_path_factory):
 
 @pytest.fixture(scope="session", autouse=True)
 def forked_reader():
-    """Archives are inspected by forks of one process, where a test does not change the environment."""
+    """Archives and shape files are read by forks of two processes, where a test does not change the environment."""
     from tests.forked_reader import ForkedReader  # noqa: PLC0415  (the hook must be there first)
+    from tests.forked_shape_reader import ForkedShapeReader  # noqa: PLC0415
 
-    reader, popen = ForkedReader(), subprocess.Popen
+    reader, shape_reader, popen = ForkedReader(), ForkedShapeReader(), subprocess.Popen
 
     class ProcessOrFork(popen):
-        """A process, or what a fork has already answered."""
+        """A process, or a fork that does the same."""
 
         def __new__(cls, command, *arguments, **options):
-            is_read = cls is ProcessOrFork and reader.reads(command, options)
-            return reader.answer(command) if is_read else super().__new__(cls)
+            if cls is ProcessOrFork and reader.reads(command, options):
+                return reader.answer(command)
+            if cls is ProcessOrFork and shape_reader.reads(command, options):
+                return shape_reader.start(command, options["stderr"])
+            return super().__new__(cls)
 
     subprocess.Popen = ProcessOrFork
     yield reader
     subprocess.Popen = popen
     reader.close()
+    shape_reader.close()
 
 
 @pytest.fixture(autouse=True)

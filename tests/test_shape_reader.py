@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import tolcontact as tc
+from tests.forked_shape_reader import ForkedShapeReader
 from tests.helpers import finish, posix_only, run, script, start
 from tests.shapes import BLOCK, refusal, shape
 from tests.step_files import Step, step_block
@@ -126,6 +127,14 @@ def test_the_reader_ends_with_an_interrupted_process(tmp_path):
     finally:
         process.kill()
         process.wait()
+
+
+@posix_only
+def test_files_are_read_by_forks_in_these_tests(tmp_path, monkeypatch):
+    started, starts = [], ForkedShapeReader.start
+    monkeypatch.setattr(ForkedShapeReader, "start", lambda *arguments: started.append(arguments) or starts(*arguments))
+    BLOCK.export(tmp_path / "block.stl")
+    assert shape(tc.Mesh(tmp_path / "block.stl", units="mm")).is_watertight and started
 
 
 def test_a_new_process_reads_the_files_if_the_early_one_is_gone(tmp_path, early_process):
