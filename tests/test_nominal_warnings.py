@@ -16,6 +16,7 @@ from tolcontact.plausibility import KINDS
 MODELS = sorted((Path(__file__).parents[1] / "models").glob("[!c]*.py")) + [
     Path(__file__).parents[1] / "models" / f"{name}.py" for name in ("cells", "channel", "clutch", "cover")
 ]
+LARGE = ("cover", "welded_sheets")
 FEET = [("A1", (2, 2, 0), "z"), ("A2", (48, 2, 0), "z"), ("A3", (25, 23, 0), "z")]
 SIDES = [("B1", (2, 0, 5), "y"), ("B2", (48, 0, 5), "y"), ("C1", (0, 12, 5), "x")]
 
@@ -356,6 +357,10 @@ def test_a_run_and_its_continuation_warn_once_each(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [path for path in MODELS if path.stem not in LARGE] + nightly(*(path for path in MODELS if path.stem in LARGE)),
+    ids=lambda path: path.stem,
+)
 def test_the_models_are_silent(path):
     assert not warned(assembly_of(path))
