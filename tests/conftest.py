@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from jaxtyping import config, install_import_hook
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a command: tests of other processes have the other cores
 PACKAGE = Path(__file__).resolve().parents[1] / "tolcontact"
 ROOMS = (
     "contact",

@@ -1,13 +1,14 @@
 """The corrected state against a second method, other solvers, other blocks, and closed forms."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 import tolcontact as tc
 from tests import cases, referee
-from tests.helpers import PAPER, R_t, nightly, placed, simulate
+from tests.helpers import PAPER, R_t, compiled, joined, nightly, placed, simulate
 from tolcontact.compilation import usable_solvers
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
@@ -26,13 +27,18 @@ def test_poses_agree_with_a_plain_qp_of_all_rows_in_another_library(case, regula
         assert np.abs(t[k, CORRECTED] - t_ref).max() < 1e-7  # t carries R's error times the lever of 100 mm
 
 
+@cache
+def of_daqp(case):
+    return simulate(case(), samples=1000, solver="daqp", method=PAPER)[1]
+
+
 @pytest.mark.parametrize("case", [*nightly(cases.ra1), cases.stack], ids=["ra1", "stack"])
 @pytest.mark.parametrize("solver", ["qpoases", "osqp", "piqp", "highs", "proxqp"])
 def test_solvers_agree_on_the_same_draws(case, solver):
     """Freedoms that only eta = 1e-6 holds enlarge an error of the QP by up to 1e3 / (share of active points)."""
     if solver not in usable_solvers():
         pytest.skip(f"{solver} does not come with this CasADi")
-    _, reference = simulate(case(), samples=1000, solver="daqp", method=PAPER)
+    reference = of_daqp(case)
     _, run = simulate(case(), samples=1000, solver=solver, method=PAPER)
     apart = np.abs(run["poses"] - reference["poses"]).max(axis=(1, 2, 3))
     if solver == "qpoases":
@@ -63,7 +69,8 @@ def test_solvers_agree_on_the_same_draws(case, solver):
     ],
 )
 def test_results_do_not_depend_on_the_block_size(case, solver, tolerance):
-    runs = [simulate(case(), samples=300, block=block, solver=solver)[1] for block in (1, 7, 1000)]
+    program = compiled(case(), solver=solver)
+    runs = [joined(tc.simulate_blocks(program, samples=100, seed=1, block=block)) for block in (1, 7, 1000)]
     for run in runs[:2]:
         for name, values in run.items():
             # Which of many coplanar points carry is not unique, and qpOASES' choice depends on the problem before.
@@ -112,13 +119,14 @@ def test_the_papers_set_alone_may_leave_penetration_and_the_closed_set_does_not(
 @pytest.mark.slow
 def test_planar_contact_is_flush():
     """With three or more active points that are not collinear, every active gap becomes 0, to order eta."""
-    program, run = simulate(cases.ra1(), samples=1000, method=PAPER)
+    program, run = simulate(cases.ra1(), samples=400, method=PAPER)
     (pair,) = program.nominal.pairs
     R, t = R_t(run["poses"])
     flush = 0
     for k in np.flatnonzero(run["status"] == Status.RESOLVED):
         active = referee.gaps(pair, R[k, RAW], t[k, RAW]) < 0
-        spread = np.linalg.svd(pair.P_m[active] - pair.P_m[active].mean(axis=0))[1] if active.sum() >= 3 else [0, 0]
+        active = pair.P_m[active]
+        spread = np.linalg.svd(active - active.mean(axis=0), compute_uv=False) if len(active) >= 3 else [0, 0]
         if spread[1] < 5:
             continue
         flush += 1
@@ -127,16 +135,15 @@ def test_planar_contact_is_flush():
         lower = R[k, CORRECTED, 1] @ [100, 12.5, 10] + t[k, CORRECTED, 1]
         n, on_plane = R[k, CORRECTED, 0] @ [0, 0, 1], R[k, CORRECTED, 0] @ [0, 0, 10] + t[k, CORRECTED, 0]
         assert abs(n @ (lower - on_plane)) < 1e-3
-    assert flush > 600
+    assert flush > 240
 
 
 @pytest.mark.parametrize("base_tolerance", [0, 6])
 def test_one_dimensional_contact(base_tolerance):
     """The gap with contact is max(0, g); with two varying parts the moving one ends at the larger of both heights."""
     samples = 20_000
-    _, run = simulate(cases.one_dimensional(base_tolerance), samples=samples, solver="daqp")
+    program, run = simulate(cases.one_dimensional(base_tolerance), samples=samples, solver="daqp")
     labels = ["base.Z", "block.Z"]
-    program = tc.build(cases.one_dimensional(base_tolerance))
     base, block = (run["deviations"][:, program.nominal.locators.labels.index(label)] for label in labels)
     height = run["measured"][:, CORRECTED, 0]
     assert np.abs(height - np.maximum(base, block)).max() < 1e-9

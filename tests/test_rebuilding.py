@@ -13,12 +13,12 @@ from tolcontact.testing import assert_gaps_recompute, assert_same_run
 
 @pytest.mark.slow
 def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path):
-    tc.run(cases.everything_of_meshes(tmp_path), samples=200, seed=2, solver="daqp", out=tmp_path / "first.nc").close()
+    tc.run(cases.everything_of_meshes(tmp_path), samples=60, seed=2, solver="daqp", out=tmp_path / "first.nc").close()
     (tmp_path / "block.stl").unlink()
     with tc.open_archive(tmp_path / "first.nc") as archive:
         first = archive.load()
     rebuilt = tc.io.model_of(first)
-    second = tc.run(rebuilt, samples=200, seed=2, solver="daqp")
+    second = tc.run(rebuilt, samples=60, seed=2, solver="daqp")
     assert_same_run(first, second)
     assert list(first["measure_units"].values) == ["mm", "mm", "rad"]
 

@@ -81,9 +81,9 @@ def test_extreme_realizations_are_shown_first(archive, page):
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"keep": "measures"}, "has no poses"),
         ({"fields": "none", "keep": "poses"}, None),
         ({"keep": "measures", "fields": "none"}, "has no poses"),
+        *nightly(({"keep": "measures"}, "has no poses")),
     ],
 )
 def test_what_an_archive_does_not_have_is_said(settings, said, tmp_path):

@@ -12,7 +12,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER, joined, simulate
+from tests.helpers import PAPER, compiled, joined, simulate
 from tolcontact.errors import ArchiveError
 
 SEATED = {"resolution": "exact", "objective": "seating"}
@@ -44,11 +44,12 @@ def test_a_third_of_the_checked_rows_are_the_deepest_and_a_third_those_with_most
 @pytest.mark.slow
 def test_the_other_checked_rows_are_drawn(archive):
     """Without penetration and with few carrying points nothing is special: what is drawn depends on the seed."""
-    runs = [tc.run(cases.stack(), samples=300, seed=seed, solver="daqp", method=PAPER, surfaces=12) for seed in (3, 4)]
+    stack = compiled(cases.stack(), solver="daqp", method=PAPER)
+    runs = [tc.run(stack, samples=300, seed=seed, surfaces=12) for seed in (3, 4)]
     assert checked(runs[0]) == checked(xr.load_datatree(archive)) != checked(runs[1])
-    few = checked(tc.run(cases.stack(), samples=5, solver="daqp", surfaces=12))
-    assert few == [*range(5), *[-1] * 7]
-    assert checked(tc.run(cases.stack(), samples=5, solver="daqp", surfaces=0)) == []
+    program = compiled(cases.stack(), solver="daqp")
+    assert checked(tc.run(program, samples=5, surfaces=12)) == [*range(5), *[-1] * 7]
+    assert checked(tc.run(program, samples=5, surfaces=0)) == []
 
 
 def test_rows_that_are_not_certified_are_not_checked():
@@ -82,7 +83,7 @@ def test_the_weighting_is_that_of_points_where_points_count():
         ("all points", "all points, as opposite faces by their moments", "mm"),
         ("locator stiffness", "none", "N"),
     ):
-        found = tc.run(cases.stack(), samples=5, solver="daqp", method={"objective": objective})
+        found = tc.run(compiled(cases.stack(), solver="daqp", method={"objective": objective}), samples=5)
         assert found.attrs["weighting"] == weighting and found["reaction"].attrs["units"] == units
 
 
@@ -90,7 +91,7 @@ def test_the_weighting_is_that_of_points_where_points_count():
 @pytest.mark.parametrize("model", [cases.ra1, cases.stack, cases.peg_in_a_hole])
 def test_the_moments_of_faces_give_the_objective(tmp_path, model):
     """The mean square displacement of faces follows from the file alone, and is the objective that was minimized."""
-    program = tc.build(model(), solver="daqp", method=tc.Method())
+    program = compiled(model(), solver="daqp", method=tc.Method())
     tc.run(program, samples=5, seed=3, out=tmp_path / "run.nc", surfaces=4).close()
     with xr.open_datatree(tmp_path / "run.nc") as tree:
         contact, R, t = tree["contact"], tree["rotation"].values, tree["translation"].values
@@ -237,11 +238,11 @@ def test_the_fields_of_a_run_that_broke_off_are_at_most_some_seconds_old(tmp_pat
         if rows >= 8192:
             raise LookupError("something else")
 
-    run = {"seed": 3, "solver": "daqp", "keep": "measures", "surfaces": 0}
+    program, run = compiled(cases.one_dimensional(6), solver="daqp"), {"seed": 3, "keep": "measures", "surfaces": 0}
     with pytest.raises(LookupError):
-        tc.run(cases.stack(), samples=20_000, out=tmp_path / "broken.nc", progress=break_off, **run)
-    tc.run(cases.stack(), samples=8192, out=tmp_path / "whole.nc", **run).close()
-    broken, whole = (xr.load_dataset(tmp_path / name, group="field/upper") for name in ("broken.nc", "whole.nc"))
+        tc.run(program, samples=20_000, out=tmp_path / "broken.nc", progress=break_off, **run)
+    tc.run(program, samples=8192, out=tmp_path / "whole.nc", **run).close()
+    broken, whole = (xr.load_dataset(tmp_path / name, group="field/block") for name in ("broken.nc", "whole.nc"))
     assert int(broken["realizations"]) == 8192
     for name in ("mean", "six_sigma", "magnitude_six_sigma_interval"):
         assert (broken[name].values == whole[name].values).all()
