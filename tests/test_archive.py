@@ -10,20 +10,25 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import SCRIPTS, run, script
+from tests.helpers import SCRIPTS, compiled, run, script
 from tolcontact.archive import bytes_of_rows
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
 from tolcontact.vocabulary import BY_REALIZATION
 
 
+@pytest.fixture(scope="module")
+def program():
+    return compiled(cases.stack(), solver="daqp")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("search", ["fixed", "bounded"])
 def test_it_is_read_with_xarray_alone_and_recomputes_its_own_gaps(search, tmp_path):
     path = tmp_path / "stack.nc"
-    tc.run(cases.stack(), samples=300, seed=3, solver="daqp", method=tc.Method(search=search), out=path).close()
+    tc.run(compiled(cases.stack(), solver="daqp", method=tc.Method(search=search)), samples=60, seed=3, out=path).close()
     done = run([sys.executable, "-I", SCRIPTS / "read_plainly.py", path])
-    assert done.returncode == 0 and len(done.stdout.split()) == 300, done.stderr
+    assert done.returncode == 0 and len(done.stdout.split()) == 60, done.stderr
     assert_gaps_recompute(path)
     contact = xr.load_dataset(path, group="contact")
     assert ("bounded" in contact) == ("plane_error" in contact) == (search == "bounded")
@@ -79,8 +84,8 @@ def test_it_may_be_read_while_its_results_are_open(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_run_in_memory_is_the_same_as_its_archive(archive):
-    assert_same_run(tc.run(cases.stack(), samples=300, seed=3, solver="daqp"), archive)
+def test_a_run_in_memory_is_the_same_as_its_archive(archive, program):
+    assert_same_run(tc.run(program, samples=300, seed=3), archive)
 
 
 def test_an_archive_without_finished_realizations_has_no_statistics(archive, tmp_path):
@@ -93,8 +98,8 @@ def test_an_archive_without_finished_realizations_has_no_statistics(archive, tmp
 
 @pytest.mark.slow
 @pytest.mark.parametrize("keep", ["measures", "poses", "all"])
-def test_what_is_kept_of_each_realization_can_be_chosen(keep, archive, tmp_path):
-    tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=tmp_path / "some.nc", keep=keep).close()
+def test_what_is_kept_of_each_realization_can_be_chosen(keep, archive, program, tmp_path):
+    tc.run(program, samples=300, seed=3, out=tmp_path / "some.nc", keep=keep).close()
     some, every = xr.load_datatree(tmp_path / "some.nc"), xr.load_datatree(archive)
     assert ("rotation" in some) == ("translation" in some) == (keep != "measures")
     assert ("deviation" in some["sample"]) == (keep == "all")
@@ -104,7 +109,7 @@ def test_what_is_kept_of_each_realization_can_be_chosen(keep, archive, tmp_path)
         assert (some["field/middle"][name].values == every["field/middle"][name].values).all()
     assert tc.summarize(some).identical(tc.summarize(every))
     with pytest.raises(tc.TolcontactError, match="expected one of: measures, poses, all"):
-        tc.run(cases.stack(), samples=300, keep="everything")
+        tc.run(program, samples=300, keep="everything")
 
 
 @pytest.mark.slow
@@ -113,19 +118,18 @@ def test_a_model_without_contact_has_an_archive_too(tmp_path):
     block = a.part("block", tc.Box(10, 20, 30))
     a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=1), tolerance=1)
     a.measure("corner", block.point(10, 20, 30), along="z", tolerance=1)
-    path = tmp_path / "alone.nc"
-    tc.run(a, samples=50, solver="daqp", out=path).close()
+    path, alone = tmp_path / "alone.nc", compiled(a, solver="daqp")
+    tc.run(alone, samples=50, out=path).close()
     assert tc.summarize(path)["by_status"].values.tolist() == [50, 0, 0, 0, 0]
-    tc.run(a, samples=60, solver="daqp", out=path, resume=True).close()
+    tc.run(alone, samples=60, out=path, resume=True).close()
     with tc.open_archive(path) as tree:
         assert tree.sizes["realization"] == 60 and [part.name for part in tc.io.model_of(tree).parts] == ["block"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("keep", ["measures", "poses", "all"])
-def test_the_bytes_of_a_row_are_foreseen(keep, tmp_path):
+def test_the_bytes_of_a_row_are_foreseen(keep, program, tmp_path):
     path = tmp_path / "run.nc"
-    program = tc.build(cases.stack(), solver="daqp")
     tc.run(program, samples=50, out=path, keep=keep, surfaces=0).close()
     with netCDF4.Dataset(path) as file:
         rows = [v for group in (file, file["sample"]) for v in group.variables.values() if "realization" in v.dimensions]

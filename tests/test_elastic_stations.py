@@ -183,7 +183,6 @@ def raised_places(program, deviations):
 @pytest.mark.parametrize(
     ("contact", "tolerance", "flatness", "count"),
     [
-        (True, 0.05, 0, 1),
         (True, 0.05, 0.1, 1),
         *nightly((True, 0.05, 0, 20), (True, 0.005, 0, 20), (False, 0.05, 0, 5), (True, 0.05, 0.1, 5), (False, 0.05, 0.1, 5)),
     ],
@@ -227,7 +226,7 @@ def test_flanges_have_one_answer_whichever_moves_and_guns_hold_where_they_are(tm
         program, out = compiled(with_form(model, flatness) if flatness else model), tmp_path / f"{roles[0]}.nc"
         pairs = [pair for pair in program.nominal.pairs if pair.name.startswith("flange")]
         assert [len(pair.P_m) for pair in pairs] == [len(cases.FLANGE) - len(cases.WELDED)] * 2
-        block = simulate_block(program, program.draws(seed=1, start=0, stop=20))
+        block = simulate_block(program, program.draws(seed=1, start=0, stop=8))
         assert (block.status == Status.RESOLVED).all()
         answers.append(block.measured[:, CORRECTED])
         tc.run(program, samples=8, seed=1, out=out).close()
@@ -255,7 +254,8 @@ def test_guns_follow_the_faces_that_they_hold_and_contact_at_guns_alone_is_refus
 def test_an_archive_of_welded_sheets_is_recomputed_and_resumed_to_the_same_bits(tmp_path):
     model = cases.welded_sheets(tmp_path)
     whole, parts = tmp_path / "whole.nc", tmp_path / "parts.nc"
-    tc.run(model, samples=24, seed=2, out=whole)
+    program = compiled(model)
+    tc.run(program, samples=12, seed=2, out=whole)
     assert_resolved(whole)
     assert_gaps_recompute(whole)
     with tc.open_archive(whole) as tree:
@@ -270,10 +270,10 @@ def test_an_archive_of_welded_sheets_is_recomputed_and_resumed_to_the_same_bits(
         assert np.abs(bent[:, 3]).max() > 1e-4
         assert tree.measured.values[:, CORRECTED, 3] == pytest.approx(height, abs=1e-6)  # u is turned by R, to second order
         assert tc.io.model_of(tree).parts[0].elasticity.stiffness == tmp_path / "front.npz"
-    tc.run(model, samples=8, seed=2, out=parts).close()
+    tc.run(program, samples=5, seed=2, out=parts).close()
     with netCDF4.Dataset(parts, "a") as file:
         file.solver_second = "qpoases, daqp, piqp"  # as earlier versions wrote, which did not count these answers
-    tc.run(model, samples=24, seed=2, out=parts, resume=True)
+    tc.run(program, samples=12, seed=2, out=parts, resume=True)
     assert_same_run(whole, parts)
     with tc.open_archive(whole) as tree, tc.open_archive(parts) as resumed:
         field, again = (results["field/rear"].to_dataset() for results in (tree, resumed))

@@ -1,13 +1,15 @@
 """A model is rebuilt from its archive, and gives the same results."""
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import ALL_POINTS, SEATED
+from tests.cases.round_contact import pinned
+from tests.helpers import ALL_POINTS, SEATED, compiled, nightly
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
 
 
@@ -18,16 +20,17 @@ def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path
     with tc.open_archive(tmp_path / "first.nc") as archive:
         first = archive.load()
     rebuilt = tc.io.model_of(first)
-    second = tc.run(rebuilt, samples=60, seed=2, solver="daqp")
+    second = tc.run(compiled(rebuilt, solver="daqp"), samples=60, seed=2)
     assert_same_run(first, second)
     assert list(first["measure_units"].values) == ["mm", "mm", "rad"]
 
 
 @pytest.mark.slow
-def test_faces_of_step_files_are_rebuilt_without_the_files():
-    first = tc.run(cases.model("cover"), samples=50, seed=2, solver="daqp", method=ALL_POINTS, surfaces=4)
-    rebuilt = tc.io.model_of(first)
-    second = tc.run(rebuilt, samples=50, seed=2, solver="daqp", method=ALL_POINTS, surfaces=4)
+@pytest.mark.parametrize("model", [pinned, *nightly(partial(cases.model, "cover"))], ids=["pin", "cover"])
+def test_faces_of_step_files_are_rebuilt_without_the_files(model):
+    first = tc.run(compiled(model(), solver="daqp", method=ALL_POINTS), samples=50, seed=2, surfaces=4)
+    rebuilt = compiled(tc.io.model_of(first), solver="daqp", method=ALL_POINTS)
+    second = tc.run(rebuilt, samples=50, seed=2, surfaces=4)
     assert_same_run(first, second)
     assert (first["contact/moving_point"].values == second["contact/moving_point"].values).all()
 

@@ -12,7 +12,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call, nightly
+from tests.helpers import call, compiled, nightly
 from tests.test_formats import STORED
 from tolcontact.report import write_page
 
@@ -87,7 +87,7 @@ def test_extreme_realizations_are_shown_first(archive, page):
     ],
 )
 def test_what_an_archive_does_not_have_is_said(settings, said, tmp_path):
-    tc.run(cases.stack(), samples=20, out=tmp_path / "little.nc", solver="daqp", **settings).close()
+    tc.run(compiled(cases.stack(), solver="daqp"), samples=20, out=tmp_path / "little.nc", **settings).close()
     page = page_of(tmp_path / "little.nc", tmp_path / "little.html")
     found = data_of(page)
     assert ("motions" in found["scene"]["realizations"]) == (settings.get("keep") != "measures")
@@ -99,7 +99,7 @@ def test_one_part_without_contact_is_a_page_too(tmp_path):
     block = a.part("block", tc.Box(10, 20, 10))
     a.locate(block, cases.translating(0.1))
     a.measure("height", block.point(5, 5, 10), along="z", limits=(None, 0.2))
-    tc.run(a, samples=10, out=tmp_path / "alone.nc").close()
+    tc.run(compiled(a), samples=10, out=tmp_path / "alone.nc").close()
     found = data_of(page_of(tmp_path / "alone.nc", tmp_path / "alone.html"))
     assert found["scene"]["contacts"] == [] and found["charts"][0]["limits"] == [None, 0.2]
 
@@ -108,7 +108,7 @@ def test_one_part_without_contact_is_a_page_too(tmp_path):
 def test_a_measure_that_is_no_number_leaves_its_chart_out(tmp_path):
     a = cases.ra1()
     a.measure("nothing", lambda poses: 0 * poses.translation(a.parts[0])[0] / 0)
-    tc.run(a, samples=10, out=tmp_path / "nan.nc", solver="daqp").close()
+    tc.run(compiled(a, solver="daqp"), samples=10, out=tmp_path / "nan.nc").close()
     found = data_of(page_of(tmp_path / "nan.nc", tmp_path / "nan.html"))
     assert found["charts"][1]["edges"] == [] and found["charts"][0]["edges"]
 
@@ -200,7 +200,7 @@ def test_odd_names_are_texts(tmp_path, open_page):
     a.locate(block, cases.translating(0.1))
     a.measure("quotes \" ' \\ & é 点", block.point(0, 0, 5), along="z", tolerance=1)
     a.measure(ODD, block.point(0, 0, 5), along="z")
-    tc.run(a, samples=10, out=tmp_path / "odd.nc").close()
+    tc.run(compiled(a), samples=10, out=tmp_path / "odd.nc").close()
     page_of(tmp_path / "odd.nc", tmp_path / "odd.html")
     opened = open_page(tmp_path / "odd.html")
     assert "odd &amp; <b>bold</b>" in opened.locator("h1").inner_text()
@@ -215,7 +215,7 @@ def test_an_unfinished_run_is_a_page_that_says_so(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        tc.run(cases.stack(), samples=60_000, solver="daqp", out=tmp_path / "part.nc", progress=stop)
+        tc.run(compiled(cases.one_dimensional(6)), samples=60_000, out=tmp_path / "part.nc", progress=stop)
     page = page_of(tmp_path / "part.nc", tmp_path / "part.html")
     assert "of 60 000; the run is unfinished" in page and len(data_of(page)["scene"]["realizations"]["names"]) == 300
 
@@ -227,7 +227,7 @@ def test_names_of_measurements_in_one_place_do_not_cover_each_other(tmp_path, op
     a.locate(block, cases.translating(0.1))
     for axis in "xyz":
         a.measure(f"place of the corner along {axis}", block.point(5, 5, 10), along=axis)
-    tc.run(a, samples=10, out=tmp_path / "alone.nc").close()
+    tc.run(compiled(a), samples=10, out=tmp_path / "alone.nc").close()
     page_of(tmp_path / "alone.nc", tmp_path / "alone.html")
     opened = open_page(tmp_path / "alone.html", 390)
     boxes = np.array(

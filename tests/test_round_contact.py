@@ -9,7 +9,7 @@ import trimesh
 import tolcontact as tc
 from tests import cases
 from tests.cases import round_contact as round_cases
-from tests.helpers import R_t, nightly, simulate
+from tests.helpers import R_t, compiled, nightly, simulate
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 from tolcontact.vocabulary import CORRECTED, Status
 
@@ -110,9 +110,8 @@ def test_a_pin_in_a_slot_touches_an_edge_of_its_side():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["cone", *nightly(*(name for name in round_cases.EVERY if name != "cone"))])
 def test_archived_gaps_of_round_faces_recompute_and_the_model_runs_again(name, tmp_path):
-    with tc.run(
-        round_cases.EVERY[name](), samples=40, method=SEATED, solver="daqp", out=tmp_path / "run.nc", keep="all"
-    ) as results:
+    program = compiled(round_cases.EVERY[name](), method=SEATED, solver="daqp")
+    with tc.run(program, samples=40, out=tmp_path / "run.nc", keep="all") as results:
         assert_resolved(results)
         assert_gaps_recompute(results, within=1e-10)
         assert_same_run(results, tc.run(tc.io.model_of(results), samples=40, method=SEATED, solver="daqp", keep="all"))
@@ -129,7 +128,8 @@ def test_steps_along_walls_that_are_known_come_to_rest_soon(name):
 
 @pytest.mark.slow
 def test_linearized_steps_start_from_the_exact_gaps():
-    results = tc.run(cases.peg_in_a_hole(), samples=200, solver="daqp", method=tc.Method(objective="all points"))
+    program = compiled(cases.peg_in_a_hole(), solver="daqp", method=tc.Method(objective="all points"))
+    results = tc.run(program, samples=60)
     assert_gaps_recompute(results)
     assert_resolved(results)
 
@@ -166,7 +166,7 @@ def test_a_bolt_finds_the_hole_of_its_own_size_in_a_file_from_others():
     hole = plate.face(tc.select.Cylinder(radius=5, inner=True), tc.select.Inside((15, 65, -1), (35, 85, 25)))
     a.contact("hole", moving=bolt.face(tc.select.Cylinder(radius=5)), reference=hole)
     a.measure("x", bolt.point(0, 0, 0), along="x")
-    with tc.run(a, samples=200, seed=1, solver="daqp") as results:
+    with tc.run(compiled(a, solver="daqp"), samples=60, seed=1) as results:
         assert_resolved(results)
         assert float(results.gap_min.sel(state="corrected").min()) > -1e-9
         assert np.abs(results.measured.sel(state="corrected")).max() < 1e-5
@@ -195,22 +195,11 @@ def test_where_the_assembly_stands_changes_nothing(resolution):
     assert (here["status"] == there["status"]).all()
 
 
-def pinned(chord):
-    """A pin in the round hole of the cover's STEP file, which is triangulated within `chord`."""
-    a = tc.Assembly("pinned", method=tc.Method(resolution="exact", objective="all points"))
-    cover = a.part("cover", tc.Mesh(cases.MODELS / "cover.step", chord=chord), fixed=True)
-    pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(4, 16, sections=30)), at=(15, 15, 4))
-    a.locate(pin, round_cases.held(pin, [(4, 0, 0), (-4, 0, 0), (0, 4, 0), (0, 0, 0), (0, 0, 0), (4, 0, 0)], 0.4))
-    a.contact("hole", moving=pin.face(tc.select.Cylinder()), reference=cover.face(tc.select.Brep((19.05, 15, 1))))
-    a.measure("x", pin.point(0, 0, 8), along="x")
-    return a
-
-
 @pytest.mark.slow
 def test_how_finely_a_step_file_is_triangulated_changes_nothing():
     runs, triangles = [], []
     for chord in (None, 0.3):
-        program, run = simulate(pinned(chord), samples=100, solver="daqp")
+        program, run = simulate(round_cases.pinned(chord), samples=100, solver="daqp")
         assert np.isin(run["status"], (Status.UNTOUCHED, Status.RESOLVED)).all()
         runs.append(run["measured"])
         triangles.append(len(program.nominal.parts[0].mesh.faces))

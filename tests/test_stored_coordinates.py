@@ -7,11 +7,12 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases.stored import FAR, ascii_stl, stored, stored_case
-from tests.helpers import FIXED, call, nightly
+from tests.helpers import FIXED, call, compiled, nightly
 from tolcontact.stored_coordinates import printed_spacing
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 
 QUICK = {"samples": 60, "surfaces": 0, "fields": "none"}
+KEPT = QUICK | {"keep": "all"}
 BOX = trimesh.creation.box(bounds=[(0, 0, 0), (20, 12.5, 8)])
 TURNED = trimesh.Trimesh(BOX.vertices, BOX.faces).apply_transform(trimesh.transformations.euler_matrix(0.3, 0.5, 1.1))
 ABROAD = TURNED.copy().apply_translation(FAR)
@@ -23,7 +24,7 @@ SINGLE = trimesh.Trimesh(ABROAD.vertices.astype(np.float32).astype(float), ABROA
 @pytest.mark.parametrize("seed", [1, *nightly(2, 3, 8, 9)])
 @pytest.mark.parametrize(("name", "faces"), [("key", True), ("dovetail", False), *nightly(("key", False), ("dovetail", True))])
 def test_bodies_without_clearance_fit_in_files_of_single_precision(name, faces, seed, tmp_path):
-    run = tc.run(stored_case(name, tmp_path, faces=faces, seed=seed), keep="all", **QUICK)
+    run = tc.run(compiled(stored_case(name, tmp_path, faces=faces, seed=seed)), **KEPT)
     assert_resolved(run)
     assert_gaps_recompute(run)
     error = run["contact"].coordinate_error.values
@@ -39,7 +40,7 @@ def test_bodies_without_clearance_fit_in_files_of_single_precision(name, faces, 
     ],
 )
 def test_bodies_without_clearance_fit_in_other_files(suffix, options, largest, tmp_path):
-    run = tc.run(stored_case("key", tmp_path, suffix, faces=True, **options), keep="all", **QUICK)
+    run = tc.run(compiled(stored_case("key", tmp_path, suffix, faces=True, **options)), **KEPT)
     assert_resolved(run)
     assert_gaps_recompute(run)
     error = run["contact"].coordinate_error.values
@@ -48,7 +49,7 @@ def test_bodies_without_clearance_fit_in_other_files(suffix, options, largest, t
 
 @pytest.mark.nightly
 def test_fixed_contact_points_allow_for_rounding_too(tmp_path):
-    run = tc.run(stored_case("key", tmp_path, faces=True), method=FIXED, keep="all", **QUICK)
+    run = tc.run(compiled(stored_case("key", tmp_path, faces=True), method=FIXED), **KEPT)
     assert_resolved(run)
     assert_gaps_recompute(run)
 
@@ -64,7 +65,7 @@ def test_a_ball_rests_lower_by_the_rounding_of_its_file(tmp_path):
         a.locate(part, [tc.Locator(f"L{k}", p, axis) for k, (p, axis) in enumerate(rows)], tolerance=1)
         a.contact("foot", moving=part.face(), reference=floor.face("+z"))
         a.measure("height", part.point(0, 0, 500), along="z", tolerance=1)
-        return tc.run(a, keep="all", **QUICK)
+        return tc.run(compiled(a), **KEPT)
 
     exact, rounded = height(tc.Mesh(ball)), height(stored(ball, tmp_path / "ball.stl"))
     assert_gaps_recompute(rounded)
@@ -90,22 +91,22 @@ def test_a_pin_without_clearance_fits_as_its_fitted_cylinder_does(at, tmp_path):
     a.locate(pin, locators, tolerance=0.1)
     a.contact("fit", moving=pin.face(tc.select.Cylinder()), reference=plate.face(tc.select.Cylinder(inner=True, radius=5)))
     a.measure("place", pin.point(*at), along="z", tolerance=1)
-    run = tc.run(a, keep="all", **QUICK)
+    run = tc.run(compiled(a), **KEPT)
     assert_resolved(run)
     assert_gaps_recompute(run)
 
 
 def test_exact_coordinates_have_no_error():
-    program = tc.build(stored_case("key", None, faces=True))
+    program = compiled(stored_case("key", None, faces=True))
     assert all(pair.coordinate_error == 0 for pair in program.nominal.pairs)
     assert program.stored_coordinates == ""
     assert "coordinate_error" not in tc.run(program, **QUICK)["contact"]
 
 
 def test_a_model_from_an_archive_has_the_error_of_its_files(tmp_path):
-    tc.run(stored_case("key", tmp_path, faces=True), **QUICK, out=tmp_path / "first.nc")
+    tc.run(compiled(stored_case("key", tmp_path, faces=True)), **QUICK, out=tmp_path / "first.nc")
     with tc.open_archive(tmp_path / "first.nc") as first:
-        again = tc.run(tc.io.model_of(first), **QUICK)
+        again = tc.run(compiled(tc.io.model_of(first)), **QUICK)
         errors = first["contact"].coordinate_error.values
         assert (again["contact"].coordinate_error.values == errors).all() and (errors > 0).all()
         assert again.measured.values == pytest.approx(first.measured.values, abs=1e-9)

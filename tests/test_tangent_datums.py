@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import linprog
 
 import tolcontact as tc
-from tests.helpers import assembly_of
+from tests.helpers import assembly_of, compiled
 from tests.population_referee import measured_back
 from tolcontact.features import FormField
 from tolcontact.testing import assert_datums_recompute, assert_same_run
@@ -43,7 +43,7 @@ def plate(form: tc.Form | None = tc.Form(), association="outside"):  # noqa: B00
 
 @pytest.fixture(scope="module")
 def program():
-    return tc.build(block())
+    return compiled(block())
 
 
 def tangents(program):
@@ -113,7 +113,7 @@ class OneMode(FormField):
     ids=["bowl", "saddle", "saddle along the edges", "gutter"],
 )
 def test_simple_forms_are_touched_where_closed_forms_say(shape, out, inverted):
-    program = tc.build(plate(tc.Form(modes=1)))
+    program = compiled(plate(tc.Form(modes=1)))
     ((_, plane),) = tangents(program).values()
     fields_of_form = {field.name: getattr(plane.form, field.name) for field in fields(FormField)}
     by_hand = replace(plane, datum=replace(plane.datum, form=OneMode(**fields_of_form, shape=shape)))
@@ -124,7 +124,7 @@ def test_simple_forms_are_touched_where_closed_forms_say(shape, out, inverted):
 
 
 def test_without_coefficients_datums_lie_where_those_of_flat_faces_do_to_the_last_bit(program):
-    flat = tc.build(block(form=None))
+    flat = compiled(block(form=None))
     formed, names = list(program.nominal.contributors), list(flat.nominal.contributors)
     free = [label for label in names if "datum" not in label]
     values, expected = np.zeros((50, len(formed))), np.zeros((50, len(names)))
@@ -141,7 +141,7 @@ def test_without_coefficients_datums_lie_where_those_of_flat_faces_do_to_the_las
 
 
 def test_least_squares_ignores_the_form_of_datums():
-    formed, flat = (tc.run(plate(form, "least squares"), samples=50, seed=2) for form in (tc.Form(), None))
+    formed, flat = (tc.run(compiled(plate(form, "least squares")), samples=50, seed=2) for form in (tc.Form(), None))
     np.testing.assert_array_equal(formed.measured, flat.measured)
 
 
@@ -150,9 +150,9 @@ def test_populations_lie_in_their_zones_from_the_planes_that_touch_their_datums(
     assert (inside.upper > 0.9973).all() and (inside.share > 0.994).all()
 
 
-def test_archives_state_the_planes_and_recompute_them(tmp_path):
+def test_archives_state_the_planes_and_recompute_them(program, tmp_path):
     path = tmp_path / "block.nc"
-    tc.run(block(), samples=8, seed=4, out=path).close()
+    tc.run(program, samples=8, seed=4, out=path).close()
     assert_datums_recompute(path)
     with tc.open_archive(path) as archive:
         sample = archive["sample"].to_dataset()
@@ -168,11 +168,12 @@ def test_archives_state_the_planes_and_recompute_them(tmp_path):
 
 def test_a_model_of_json_has_the_same_datums(tmp_path):
     tc.io.write_model(plate(), tmp_path / "plate.json")
-    assert_same_run(tc.run(assembly_of(tmp_path / "plate.json"), samples=8), tc.run(plate(), samples=8))
+    read = assembly_of(tmp_path / "plate.json")
+    assert_same_run(*(tc.run(compiled(model), samples=8) for model in (read, plate())))
 
 
 def test_contributions_count_a_plane_with_the_form_that_it_follows():
-    program = tc.build(plate())
+    program = compiled(plate())
     found = tc.analyses.contributions(program, samples=64).sel(measure="height", state="raw")
     name = "plate.foot.form + plate.top.datum A of A: offset + plate.top.datum A of A: tilt x + plate.top.datum A of A: tilt y"
     assert name in found["group"].values

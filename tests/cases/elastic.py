@@ -1,6 +1,7 @@
 """Elastic bodies with stiffness known in closed form, as files of matrices, and models of them."""
 
 import itertools
+from functools import cache
 
 import numpy as np
 
@@ -70,6 +71,7 @@ FREE = [
 ]
 
 
+@cache
 def sheet_mesh(thickness, cells=(12, 8)):
     """Nodes (node, 3) and K (3 node, 3 node) of a steel sheet of 300 x 200 mm, of bricks with incompatible modes."""
     return bricks((300.0, 200.0, thickness), (*cells, 1), 210e3, 0.3)

@@ -7,6 +7,7 @@ import trimesh
 from scipy.optimize import brentq
 
 import tolcontact as tc
+from tests.cases.frames import MODELS
 from tests.cases.locators import parked
 from tests.cases.round_bodies import ball_in_a_cone, peg_in_a_hole, shaft_in_a_v
 
@@ -90,3 +91,14 @@ EVERY = {
     "peg": peg_in_a_hole, "V": shaft_in_a_v, "cone": partial(ball_in_a_cone, sections=96, subdivisions=3),
     "fine cone": ball_in_a_cone, "jammed": jammed_peg, "pins": ball_on_three_pins, "slot": cylinder_in_a_slot,
 }  # fmt: skip
+
+
+def pinned(chord=None):
+    """A pin in the round hole of the cover's STEP file, which is triangulated within `chord`."""
+    a = tc.Assembly("pinned", method=tc.Method(resolution="exact", objective="all points"))
+    cover = a.part("cover", tc.Mesh(MODELS / "cover.step", chord=chord), fixed=True)
+    pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(4, 16, sections=30)), at=(15, 15, 4))
+    a.locate(pin, held(pin, [(4, 0, 0), (-4, 0, 0), (0, 4, 0), (0, 0, 0), (0, 0, 0), (4, 0, 0)], 0.4))
+    a.contact("hole", moving=pin.face(tc.select.Cylinder()), reference=cover.face(tc.select.Brep((19.05, 15, 1))))
+    a.measure("x", pin.point(0, 0, 8), along="x")
+    return a
