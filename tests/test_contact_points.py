@@ -8,7 +8,7 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import ALL_POINTS, compiled, simulate
+from tests.helpers import ALL_POINTS, compiled, nightly, simulate
 from tolcontact.discretization import discretize
 from tolcontact.statistics import estimate_of
 
@@ -22,7 +22,7 @@ def tessellated(n):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", [1, 3, 10, 150])
+@pytest.mark.parametrize("n", [1, 10, 60, *nightly(3, 150)])
 def test_contact_points_follow_the_spacing_and_not_the_tessellation(n):
     a = tc.Assembly("resampled")
     table = a.part("table", tc.Box(50, 25, 10), at=(0, 0, -10), fixed=True)

@@ -1,15 +1,23 @@
 """The public asserts pass where they should, and say what is wrong where they should not."""
 
+from functools import cache, partial
+
 import numpy as np
 import pytest
 import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import EXACT, FIXED, SEATED
+from tests.helpers import EXACT, FIXED, SEATED, compiled
 from tolcontact.errors import OptionError
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 from tolcontact.vocabulary import Status
+
+
+@cache
+def run_of(make, method):
+    """A run of a model. Copy it to change it."""
+    return tc.run(compiled(make(), solver="daqp", method=method), samples=20, seed=3)
 
 
 @pytest.fixture
@@ -52,7 +60,7 @@ def test_realizations_keep_their_numbers_in_a_part_of_a_run(results):
 def test_gaps_that_are_not_those_of_the_points_are_told_with_their_place(name, where, method):
     if method is EXACT and name == "contact/reference_point":
         pytest.skip("places where faces end do not follow from contact points")
-    results = tc.run(cases.stack(), samples=12, seed=3, solver="daqp", method=method)
+    results = run_of(cases.stack, method).copy(deep=True)
     results[name].values[where] += 1e-6
     place = r'realization \d+, (raw|corrected), contact pair "(lower|upper) joint"'
     with pytest.raises(AssertionError, match=rf'"gap_min" is not .* by .*e-0\d mm in {place}; 1e-09 mm are allowed'):
@@ -74,13 +82,13 @@ def test_gaps_of_points_that_are_not_archived_are_passed_over(results):
 
 @pytest.mark.parametrize(("keep", "lost"), [("measures", "rotation"), ("poses", "deviation")])
 def test_gaps_are_not_computed_without_poses_and_the_deviations_of_supports(keep, lost):
-    table = tc.run(cases.table(), samples=20, solver="daqp", method=SEATED, keep=keep)
+    table = tc.run(compiled(cases.table(), solver="daqp", method=SEATED), samples=20, keep=keep)
     with pytest.raises(AssertionError, match=rf'"{lost}", which was not kept'):
         assert_gaps_recompute(table)
 
 
 def test_gaps_of_supports_are_less_by_their_deviations():
-    table = tc.run(cases.table(), samples=20, solver="daqp", method=SEATED)
+    table = run_of(cases.table, SEATED).copy(deep=True)
     assert_gaps_recompute(table)
     table["sample/deviation"].values[3] -= 0.1
     with pytest.raises(AssertionError, match=r'by 0.1 mm in realization 3, .*, contact pair "supports of plate"'):
@@ -116,8 +124,8 @@ def test_the_last_bit_counts_and_nan_equals_nan(results):
 @pytest.mark.slow
 def test_runs_of_other_models_or_sizes_are_not_the_same(archive, results):
     with pytest.raises(AssertionError, match=r"labels of part differ: \['bottom', 'middle', 'upper'\] and \['base', 'top'\]"):
-        assert_same_run(archive, tc.run(cases.ra1(points=9), samples=20, solver="daqp"))
-    fewer = tc.run(cases.stack(), samples=20, seed=3, solver="daqp", keep="poses")
+        assert_same_run(archive, run_of(partial(cases.ra1, points=9), None))
+    fewer = tc.run(compiled(cases.stack(), solver="daqp"), samples=20, seed=3, keep="poses")
     with pytest.raises(AssertionError, match="300 and 20 realizations"):
         assert_same_run(archive, fewer)
     with pytest.raises(AssertionError, match='in 1 variable; first in "deviation", which only one of them keeps'):

@@ -7,7 +7,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests.cases import stations as cases
-from tests.helpers import contents, run, script
+from tests.helpers import compiled, contents, run, script
 from tolcontact.archive import bytes_of_rows
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
@@ -16,14 +16,18 @@ GROUPS = (None, "sample", "contact", "station/weld", "station/check", "field/a",
 
 
 @pytest.fixture(scope="module")
-def archive(tmp_path_factory):
+def program():
+    return compiled(cases.rail(), solver="daqp")
+
+
+@pytest.fixture(scope="module")
+def archive(program, tmp_path_factory):
     path = tmp_path_factory.mktemp("stations") / "whole.nc"
-    tc.run(cases.rail(), samples=5000, seed=3, solver="daqp", out=path, surfaces=8).close()
+    tc.run(program, samples=5000, seed=3, out=path, surfaces=8).close()
     return path
 
 
-def test_an_archive_holds_every_station(archive):
-    program = tc.build(cases.rail(), solver="daqp")
+def test_an_archive_holds_every_station(archive, program):
     (block,) = tc.simulate_blocks(program, samples=300, seed=3)
     with xr.open_datatree(archive) as results:
         assert results.attrs["format"] == 1
@@ -47,28 +51,29 @@ def test_an_archive_holds_every_station(archive):
     assert_resolved(archive)
 
 
-def test_its_model_is_rebuilt_also_from_json(archive, tmp_path):
+def test_its_model_is_rebuilt_also_from_json(archive, program, tmp_path):
     with tc.open_archive(archive) as results:
         rebuilt = tc.io.model_of(results)
         assert [station.name for station in rebuilt.stations] == ["weld", "check"]
-        assert_same_run(tc.run(rebuilt, samples=5000, seed=3, solver="daqp", surfaces=8), results)
-    model = cases.rail()
-    tc.io.write_model(model, tmp_path / "rail.json")
-    runs = [tc.run(declared, samples=50, solver="daqp", surfaces=0) for declared in (model, tmp_path / "rail.json")]
-    assert_same_run(*runs)
+    tc.io.write_model(cases.rail(), tmp_path / "rail.json")
+    own, *others = (
+        tc.run(one, samples=300, seed=3, surfaces=8)
+        for one in (program, *(compiled(model, solver="daqp") for model in (rebuilt, tmp_path / "rail.json")))
+    )
+    for other in others:
+        assert_same_run(other, own)
 
 
-def test_a_run_is_resumed(archive, tmp_path):
+def test_a_run_is_resumed(archive, program, tmp_path):
     path = tmp_path / "grown.nc"
     for samples in (300, 5000):
-        tc.run(cases.rail(), samples=samples, seed=3, solver="daqp", out=path, surfaces=8, resume=path.exists()).close()
+        tc.run(program, samples=samples, seed=3, out=path, surfaces=8, resume=path.exists()).close()
     for group in GROUPS:
         assert contents(path, group).identical(contents(archive, group)), group
     assert_same_run(path, archive)
 
 
-def test_the_bytes_of_a_row_are_foreseen(archive):
-    program = tc.build(cases.rail(), solver="daqp")
+def test_the_bytes_of_a_row_are_foreseen(program):
     for keep in ("measures", "poses", "all"):
         results = tc.run(program, samples=50, keep=keep, surfaces=0)
         rows = [
@@ -174,7 +179,7 @@ def test_a_fault_of_the_sequence_is_one_message(case):
 def test_raw_states_follow_raw_states_and_gaps_are_those_of_each_station():
     linear = tc.Method(resolution="linearized", objective="all points")
     with_contact, without = (
-        tc.run(cases.three_stations(1.0, contact=contact), samples=60, solver="daqp", method=linear, surfaces=0)
+        tc.run(compiled(cases.three_stations(1.0, contact=contact), solver="daqp", method=linear), samples=60, surfaces=0)
         for contact in (True, False)
     )
     raw = [results.measured.sel(state="raw").values for results in (with_contact, without)]

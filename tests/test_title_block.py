@@ -14,7 +14,7 @@ BLOCK = tc.TitleBlock(
 
 
 def titled(block):
-    a = cases.stack()
+    a = cases.one_dimensional(6)
     a.title_block = block
     return a
 
@@ -37,7 +37,7 @@ def test_an_archive_holds_the_block_and_the_page_shows_it(tmp_path):
 
 
 def test_an_archive_without_a_block_has_none():
-    results = tc.run(cases.stack(), samples=20, solver="daqp")
+    results = tc.run(titled(None), samples=20, solver="daqp")
     assert not entries_in(results)
     assert tc.io.model_of(results).title_block is None
 

@@ -203,12 +203,13 @@ def intrusions(source: ast.AST) -> Iterator[str]:
     defined |= {node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
     for node in nodes:
         if isinstance(node, ast.Attribute | ast.Subscript):
-            base, name = ast.unparse(node.value), getattr(node, "attr", "")
+            name, is_stored = getattr(node, "attr", ""), not isinstance(node.ctx, ast.Load)
+            base = ast.unparse(node.value) if is_stored or is_private(name) else ""
             is_own = base == "self" and name in defined
-            is_changed = not isinstance(node.ctx, ast.Load) and base.split(".")[0] in theirs
+            is_changed = is_stored and base.split(".")[0] in theirs
             if (is_private(name) and not is_own) or is_changed:
                 yield f"line {node.lineno}: {ast.unparse(node)}"
-        elif isinstance(node, ast.Call) and node.args and ast.unparse(node.func).split(".")[-1] in SETTERS:
+        elif isinstance(node, ast.Call) and node.args and getattr(node.func, "attr", getattr(node.func, "id", "")) in SETTERS:
             target = ast.unparse(node.args[0]).strip("'").split(".")[0]
             if target in {*theirs, "tolcontact"} and ast.unparse(node.func) not in theirs:
                 yield f"line {node.lineno}: {ast.unparse(node)}"

@@ -140,7 +140,8 @@ def varied():
 
 
 def region(a):
-    return AllowedRegion(tc.build(a, solver="daqp").draws, seed=1), list(tc.build(a).nominal.contributors)
+    program = compiled(a, solver="daqp")
+    return AllowedRegion(program.draws, seed=1), list(program.nominal.contributors)
 
 
 def test_every_contributor_has_the_range_of_its_drawing():
