@@ -14,7 +14,7 @@ from rich.console import Console
 from scipy.stats import norm
 
 import tolcontact as tc
-from tests.helpers import assembly_of, call
+from tests.helpers import assembly_of, call, compiled
 from tests.step_files import step_block
 from tolcontact.report import summary_text
 from tolcontact.testing import assert_no_clashes, assert_resolved
@@ -65,9 +65,7 @@ def share_of(text: str) -> float:
 
 @pytest.fixture(scope="module")
 def results():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", tc.NominalWarning)
-        return tc.run(beside_wall(), samples=2000, seed=1, surfaces=0)
+    return tc.run(compiled(beside_wall()), samples=2000, seed=1, surfaces=0)
 
 
 def test_clashes_have_the_probability_of_the_normal_distribution(results):
@@ -122,7 +120,7 @@ def test_the_suggested_contact_ends_the_clash():
     _, wall, block = assembly.parts
     assembly.contact("block on wall", moving=block.face("-x"), reference=wall.face("+x"))
     assert not warned(assembly)
-    results = tc.run(assembly, samples=200, seed=1, surfaces=0)
+    results = tc.run(compiled(assembly), samples=200, seed=1, surfaces=0)
     assert_no_clashes(results)
     assert_resolved(results)
     lines = printed(tc.summarize(results))
@@ -134,7 +132,7 @@ def test_overlaps_that_are_meant_are_not_told(tmp_path):
     overlap = assembly.may_overlap(*assembly.parts[1:])
     assert str(overlap) == "overlap of wall, block" and not warned(assembly)
     path = tmp_path / "meant.nc"
-    results = tc.run(assembly, samples=100, seed=1, surfaces=0, out=path)
+    results = tc.run(compiled(assembly), samples=100, seed=1, surfaces=0, out=path)
     assert_no_clashes(results)
     assert results.attrs["not_watched"] == "overlaps that are declared: (wall, block)"
     results.close()
@@ -196,9 +194,7 @@ def test_a_block_that_sinks_into_its_base_on_springs_is_named_without_a_pair():
 
 
 def test_answers_beyond_the_chosen_faces_are_doubtful_and_say_why():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", tc.NominalWarning)
-        results = tc.run(beside_wall(table=angle_table()), samples=200, seed=1, surfaces=0)
+    results = tc.run(compiled(beside_wall(table=angle_table())), samples=200, seed=1, surfaces=0)
     depth = -CLEARANCE - results.measured.sel(state="corrected", measure="x").values
     doubtful = results.status.values == tc.Status.DOUBTFUL
     allowed = results.attrs["interference_depth"]
@@ -216,13 +212,11 @@ def test_a_second_pair_at_the_wall_ends_the_doubt():
     face = base.face("+x", tc.select.Inside((-1, -1, 10), (1, 61, 41)))
     assembly.contact("wall", moving=block.face("-x"), reference=face)
     assert not warned(assembly)
-    assert_resolved(tc.run(assembly, samples=200, seed=1, surfaces=0))
+    assert_resolved(tc.run(compiled(assembly), samples=200, seed=1, surfaces=0))
 
 
 def test_linearized_runs_say_that_bodies_were_not_tested():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", tc.NominalWarning)
-        results = tc.run(beside_wall(), samples=50, seed=1, surfaces=0, method={"resolution": "linearized"})
+    results = tc.run(compiled(beside_wall(), method={"resolution": "linearized"}), samples=50, seed=1, surfaces=0)
     summary = tc.summarize(results)
     assert int(summary["watched"]) == 0 and math.isnan(summary["clash_share"].values[0])
     assert "\n  bodies were not tested for interference by a lin" in printed(summary)
@@ -265,7 +259,7 @@ def test_pairs_of_parts_are_combined_once():
     """Any two parts of one overlap may lie in each other, in every order."""
     assembly = beside_wall()
     assembly.may_overlap(*reversed(assembly.parts))
-    allowed = tc.build(assembly).watch.allowed
+    allowed = compiled(assembly).watch.allowed
     assert all(allowed[pair] == math.inf for pair in itertools.combinations(range(3), 2))
 
 
@@ -293,4 +287,4 @@ def test_the_suggested_line_chooses_faces_of_step_files_that_end_the_clash(tmp_p
     added.append(re.search(r"assembly\.contact\(.*\)(?=, or say)", text)[0])
     assert added[0].count("tc.select.Brep(") == 2
     assert not warned(nook())
-    assert_no_clashes(tc.run(nook(), samples=200, seed=1, surfaces=0))
+    assert_no_clashes(tc.run(compiled(nook()), samples=200, seed=1, surfaces=0))

@@ -195,7 +195,7 @@ tc.run(program, samples=20).close()
 out = Path(sys.argv[1])
 for resume in (False, True):
     tc.run(program, samples=20, out=out, resume=resume).close()
-tc.analyses.sensitivities(out, into=out)
+tc.analyses.sensitivities(out, samples=20, into=out)
 with tc.open_archive(out) as results:
     print(results.sizes["realization"], *results["statistics"].children, *(path.name for path in out.parent.iterdir()))
 """

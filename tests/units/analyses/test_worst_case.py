@@ -46,7 +46,7 @@ def few_searches(model, samples, method=None):
 )
 def test_fasteners_have_the_documented_extremes(is_fixed, pull, end, with_float, without):
     """Fixed and floating fasteners: extremes by hand. Forces decide where the float goes; the bound is that of any float."""
-    found = few_searches(fasteners(is_fixed, pull), 32)
+    found = few_searches(compiled(fasteners(is_fixed, pull), solver="daqp"), 32)
     assert values(found)[end] == pytest.approx(with_float, abs=2e-6)
     assert values(found, measure=1)[end] == pytest.approx(without, abs=2e-6)
     assert values(found, 1, "raw", "bound") == pytest.approx([100 - without, without][:: 1 if end else -1], abs=1e-6)
@@ -93,7 +93,7 @@ def influences_of(a, count=16):
 
 
 def test_contributors_without_influence_are_left_out_and_change_no_answer():
-    plain, crowded = (few_searches(with_idle_parts(small_ra1(), count), 16) for count in (0, 4))
+    plain, crowded = (few_searches(compiled(with_idle_parts(small_ra1(), count), solver="daqp"), 16) for count in (0, 4))
     assert crowded.sizes["contributor"] == plain.sizes["contributor"] + 24
     spread = np.ptp(values(plain))
     assert values(crowded) == pytest.approx(values(plain), abs=0.02 * spread)

@@ -13,7 +13,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import FIXED, nightly
+from tests.helpers import FIXED, compiled, nightly
 from tolcontact.archive.settings import declaration
 from tolcontact.declaration.codec import EntryError, Place, Sources
 from tolcontact.declaration.document import from_document
@@ -26,7 +26,7 @@ DAMAGED = "^the declared model in the archive is damaged: "
 
 def built(assembly):
     """The program of a model whose draws conflict, which takes long to find out where planes end."""
-    return tc.build(assembly, solver="daqp", method=FIXED)
+    return compiled(assembly, solver="daqp", method=FIXED)
 
 
 @pytest.fixture(scope="module")
