@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from jaxtyping import config, install_import_hook
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a command: tests of other processes have the other cores
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as a command does; it reaches the workers of xdist
 PACKAGE = Path(__file__).resolve().parents[1] / "tolcontact"
 ROOMS = (
     "contact",
