@@ -3,7 +3,7 @@
 import pytest
 
 from tests import cases
-from tests.helpers import SEATED, nightly, simulate
+from tests.helpers import SEATED, SEATED_ON_POINTS, nightly, simulate
 from tests.test_certificates import largest_turn
 from tolcontact.contact.acceptance import MAX_TURN
 from tolcontact.vocabulary import CORRECTED, Status
@@ -11,11 +11,15 @@ from tolcontact.vocabulary import CORRECTED, Status
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("wedges", "solver", "samples"), [(3, "daqp", 50), *nightly((3, "daqp", 400), (3, "qpoases", 400), (6, "daqp", 400))]
+    ("wedges", "solver", "samples", "method"),
+    [
+        (3, "daqp", 50, SEATED_ON_POINTS),  # where parts in conflict have few further starts
+        *nightly((3, "daqp", 50, SEATED), (3, "daqp", 400, SEATED), (3, "qpoases", 400, SEATED), (6, "daqp", 400, SEATED)),
+    ],
 )
-def test_a_ring_closes_where_its_angles_leave_room(wedges, solver, samples):
+def test_a_ring_closes_where_its_angles_leave_room(wedges, solver, samples, method):
     """The excess of an impossible ring is left over, shared by the joints, to the second order of the angles."""
-    program, run = simulate(cases.hinged_ring(wedges), samples=samples, solver=solver, method=SEATED)
+    program, run = simulate(cases.hinged_ring(wedges), samples=samples, solver=solver, method=method)
     excess = cases.excess_of_hinged_ring(program.nominal, run["deviations"])
     assert samples / 10 < (excess > 0).sum() < samples * 3 / 10
     assert ((run["status"] == Status.NOT_ASSEMBLABLE) == (excess > 0)).all()
