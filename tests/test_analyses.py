@@ -11,7 +11,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER, call
+from tests.helpers import PAPER, call, compiled
 from tests.test_report import data_of, unpacked
 from tolcontact.report import write_page
 
@@ -19,9 +19,14 @@ FAST = {"solver": "daqp", "method": PAPER}
 
 
 @pytest.fixture(scope="module")
-def run_of_ra1(tmp_path_factory):
+def ra1():
+    return compiled(cases.ra1(), **FAST)
+
+
+@pytest.fixture(scope="module")
+def run_of_ra1(ra1, tmp_path_factory):
     path = tmp_path_factory.mktemp("ra1") / "ra1.nc"
-    tc.run(cases.ra1(), samples=300, out=path, surfaces=4, fields=64, **FAST).close()
+    tc.run(ra1, samples=300, out=path, surfaces=4, fields=64).close()
     return path
 
 
@@ -32,15 +37,13 @@ def archive(run_of_ra1, tmp_path):
 
 
 @pytest.mark.slow
-def test_an_archive_keeps_what_was_asked_of_its_model(archive):
+def test_an_archive_keeps_what_was_asked_of_its_model(ra1, archive):
     kept = {
-        "contributions": tc.analyses.contributions(cases.ra1(), samples=1024, into=archive, **FAST),
-        "sensitivities": tc.analyses.sensitivities(cases.ra1(), samples=16, into=archive, **FAST),
-        "worst_case": tc.analyses.worst_case(cases.ra1(), samples=16, into=archive, **FAST),
-        "tails": tc.analyses.tails(cases.ra1(), samples=30_000, into=archive, **FAST),
-        "allocation": tc.analyses.allocate(
-            cases.ra1(), "corner height: ppm 700000", samples=256, by="part", into=archive, **FAST
-        ),
+        "contributions": tc.analyses.contributions(ra1, samples=1024, into=archive),
+        "sensitivities": tc.analyses.sensitivities(ra1, samples=16, into=archive),
+        "worst_case": tc.analyses.worst_case(ra1, samples=16, into=archive),
+        "tails": tc.analyses.tails(ra1, samples=30_000, into=archive),
+        "allocation": tc.analyses.allocate(ra1, "corner height: ppm 700000", samples=256, by="part", into=archive),
     }
     with tc.open_archive(archive) as results:
         assert results.sizes["realization"] == 300 and tc.summarize(results).attrs["realizations"] == 300
@@ -65,7 +68,7 @@ def test_an_archive_keeps_what_was_asked_of_its_model(archive):
     assert '"groups":["base.A2"' in page
     with netCDF4.Dataset(archive) as file:  # without us
         assert file["statistics/contributions/total"].units == "1"
-    tc.run(cases.ra1(), samples=600, out=archive, resume=True, surfaces=4, fields=64, **FAST).close()
+    tc.run(ra1, samples=600, out=archive, resume=True, surfaces=4, fields=64).close()
     with xr.open_datatree(archive) as longer:
         assert longer.sizes["realization"] == 600 and "tails" in longer["statistics"].children
 
@@ -75,12 +78,13 @@ def test_a_model_without_contact_can_be_asked_as_well():
     part = a.part("plate", tc.Box(100, 50, 10))
     a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=10), tolerance=0.1)
     a.measure("corner", part.point(100, 50, 10), along="z", tolerance=0.1)
-    worst = tc.analyses.worst_case(a, samples=64, **FAST)
+    program = compiled(a, **FAST)
+    worst = tc.analyses.worst_case(program, samples=64)
     assert np.abs(worst.worst.values - worst.bound.values).max() < 1e-3
-    assert float(tc.analyses.contributions(a, samples=256, **FAST).missed.max()) < 1e-3
-    nominal = tc.analyses.sensitivities(a, samples=4, **FAST).nominal.values[0]
+    assert float(tc.analyses.contributions(program, samples=256).missed.max()) < 1e-3
+    nominal = tc.analyses.sensitivities(program, samples=4).nominal.values[0]
     assert worst.bound.values[0, 0, 1] == pytest.approx(0.05 * np.abs(nominal).sum(), abs=1e-9)
-    assert tc.analyses.tails(a, samples=30_000, **FAST).sizes["event"] == 1
+    assert tc.analyses.tails(program, samples=30_000).sizes["event"] == 1
 
 
 @pytest.mark.slow
@@ -91,26 +95,26 @@ def test_a_page_without_analyses_has_no_such_section(archive, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_does_not_fit_leaves_the_archive_as_it_was(archive, tmp_path):
+def test_what_does_not_fit_leaves_the_archive_as_it_was(ra1, archive, tmp_path):
     before = archive.read_bytes()
     with pytest.raises(tc.errors.ArchiveError, match="another model"):
         tc.analyses.sensitivities(cases.one_dimensional(0), samples=4, into=archive, **FAST)
     with pytest.raises(tc.errors.ArchiveError, match="does not exist"):
-        tc.analyses.sensitivities(cases.ra1(), samples=4, into=tmp_path / "none.nc", **FAST)
+        tc.analyses.sensitivities(ra1, samples=4, into=tmp_path / "none.nc")
     (tmp_path / "text.nc").write_text("no archive")
     with pytest.raises(tc.errors.ArchiveError, match=r"text\.nc"):
-        tc.analyses.sensitivities(cases.ra1(), samples=4, into=tmp_path / "text.nc", **FAST)
+        tc.analyses.sensitivities(ra1, samples=4, into=tmp_path / "text.nc")
     assert archive.read_bytes() == before
-    tc.analyses.sensitivities(cases.ra1(), samples=4, into=archive, **FAST)
+    tc.analyses.sensitivities(ra1, samples=4, into=archive)
     once = archive.read_bytes()
     with pytest.raises(tc.errors.ArchiveError, match="already has statistics/sensitivities"):
-        tc.analyses.sensitivities(cases.ra1(), samples=4, into=archive, **FAST)
+        tc.analyses.sensitivities(ra1, samples=4, into=archive)
     assert archive.read_bytes() == once and not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
 @pytest.mark.slow
-def test_numbers_that_were_damaged_are_not_shown(archive):
-    tc.analyses.contributions(cases.ra1(), samples=16, into=archive, **FAST)
+def test_numbers_that_were_damaged_are_not_shown(ra1, archive):
+    tc.analyses.contributions(ra1, samples=16, into=archive)
     content = bytearray(archive.read_bytes())
     with netCDF4.Dataset(archive) as file:
         values = file["statistics/contributions/linear"][:].tobytes()
@@ -140,8 +144,9 @@ def test_the_command_keeps_it_too(tmp_path):
 def test_the_model_of_an_archive_is_analysed_by_the_method_seed_and_solver_of_its_run(tmp_path):
     path = tmp_path / "ra1.nc"
     method = tc.Method(resolution="exact", objective="all points", active_set="initial")
-    tc.run(cases.ra1(), samples=4, seed=7, out=path, surfaces=0, solver="daqp", method=method).close()
-    expected = tc.analyses.sensitivities(cases.ra1(), samples=8, seed=7, solver="daqp", method=method)
+    program = compiled(cases.ra1(), solver="daqp", method=method)
+    tc.run(program, samples=4, seed=7, out=path, surfaces=0).close()
+    expected = tc.analyses.sensitivities(program, samples=8, seed=7)
     done = call(tmp_path, "sensitivities", path, "--samples", "8", "--json")
     assert done.returncode == 0, done.stderr
     found = xr.Dataset.from_dict(json.loads(done.stdout))

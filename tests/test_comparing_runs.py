@@ -8,7 +8,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call, nightly
+from tests.helpers import call, compiled, nightly
 from tests.test_report import data_of
 from tolcontact.report import write_comparison
 
@@ -22,6 +22,10 @@ def lifted(by, name="top", tolerance=None):
     return a
 
 
+def run_of(model, **options):
+    return tc.run(compiled(model, solver="daqp"), surfaces=0, **options)
+
+
 @pytest.fixture(scope="module")
 def runs():
     made = {
@@ -29,7 +33,7 @@ def runs():
         "higher": (lifted(0.25), 200, 1),
         "other": (lifted(0.0, "sideways"), 400, 2),
     }
-    return {name: tc.run(model, samples=n, seed=seed, solver="daqp", surfaces=0) for name, (model, n, seed) in made.items()}
+    return {name: run_of(model, samples=n, seed=seed) for name, (model, n, seed) in made.items()}
 
 
 @pytest.mark.slow
@@ -61,10 +65,8 @@ def test_independent_runs_have_wider_intervals_than_the_same_draws(runs):
 
 
 def test_a_tolerance_that_differs_is_of_the_same_seed():
-    wider = cases.stack()
-    wider_run = tc.run(wider, samples=50, solver="daqp", keep="measures", surfaces=0)
-    narrow_run = tc.run(lifted(0.0), samples=50, solver="daqp", keep="measures", surfaces=0)
-    assert str(tc.compare_runs({"a": wider_run, "b": narrow_run}).draws.sel(run="b").values) == "same seed"
+    wider, narrow = (run_of(model, samples=50, keep="measures") for model in (cases.stack(), lifted(0.0)))
+    assert str(tc.compare_runs({"a": wider, "b": narrow}).draws.sel(run="b").values) == "same seed"
 
 
 @pytest.mark.slow
@@ -73,7 +75,7 @@ def test_measures_are_in_the_order_of_the_first_run():
         a = cases.stack()
         for name in names:
             a.measure(name, a.parts[-1].point(0, 0, 10), along="z")
-        return tc.run(a, samples=20, seed=1, solver="daqp", surfaces=0)
+        return run_of(a, samples=20, seed=1)
 
     found = tc.compare_runs({"one": measured("a", "b", "c"), "other": measured("c", "d", "a")})
     assert [name for name in found["measure"].values if name in "abcd"] == ["a", "c"]
@@ -82,7 +84,7 @@ def test_measures_are_in_the_order_of_the_first_run():
 @pytest.mark.slow
 def test_the_command_compares_archives(archive, tmp_path):
     again = tmp_path / "again.nc"
-    tc.run(cases.stack(), samples=100, seed=4, solver="daqp", out=again, surfaces=0).close()
+    run_of(cases.stack(), samples=100, seed=4, out=again).close()
     done = call(tmp_path, "compare", archive, again, "--out", "both.nc", "--report", "both.html")
     assert done.returncode == 0, done.stderr
     assert max(map(len, done.stdout.splitlines())) <= 80 and "other draws" in done.stdout
@@ -143,7 +145,7 @@ def test_one_limit_is_enough_to_be_outside():
     def limited(**limits):
         a = cases.stack()
         a.measure("height", a.parts[-1].point(0, 0, 10), along="z", **limits)
-        return tc.run(a, samples=200, seed=1, solver="daqp", surfaces=0)
+        return run_of(a, samples=200, seed=1)
 
     wide, narrow, none = limited(limits=(None, 0.3)), limited(limits=(None, 0.0)), limited()
     change = tc.compare_runs({"wide": wide, "narrow": narrow}).change.sel(run="narrow", measure="height", state="raw")

@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 import tolcontact as tc
 from tests.cases import elastic as cases
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tests.test_elastic_parts import tips
 from tests.test_elastic_stations import WholeSheets
 from tolcontact.errors import OptionError
@@ -35,8 +35,9 @@ def allocated(model):
 
 
 def stacked(model):
-    found = tc.analyses.stack_up(model, samples=2000)["simulated"].sel(measure="left tip", state="corrected")
-    assert found.sel(interval="estimate").values == pytest.approx([-3 * SIGMA, 3 * SIGMA], rel=0.1)
+    found = tc.analyses.stack_up(compiled(model, solver="graph"), samples=2000)["simulated"]
+    found = found.sel(measure="left tip", state="corrected", interval="estimate")
+    assert found.values == pytest.approx([-3 * SIGMA, 3 * SIGMA], rel=0.1)
 
 
 def with_rare_events(model):
@@ -109,14 +110,14 @@ def welded(folder, limit=None, *, contact=False):
 
 def test_sensitivities_of_welded_sheets_are_those_of_their_whole_meshes(tmp_path, slopes):
     """Heights differ by squares of rotations, which the whole meshes leave out."""
-    found = tc.analyses.sensitivities(welded(tmp_path), samples=20, solver="graph")["sensitivity"]
+    found = tc.analyses.sensitivities(compiled(welded(tmp_path), solver="graph"), samples=20)["sensitivity"]
     found = found.sel(state="corrected", interval="estimate", contributor=LABELS).transpose("measure", ...)
     assert np.abs(slopes[1]).max() > 0.3  # they spring back by less than they were bent
     assert found.values == pytest.approx(slopes, abs=1e-3)
 
 
 def test_contributions_to_the_released_sheets_are_those_of_their_whole_meshes(tmp_path, slopes):
-    found = tc.analyses.contributions(welded(tmp_path), samples=512, solver="graph")
+    found = tc.analyses.contributions(compiled(welded(tmp_path), solver="graph"), samples=512)
     first = found["first"].sel(state="corrected", group=LABELS)
     for measure, row in zip(first.measure.values, slopes**2 / (slopes**2).sum(axis=1, keepdims=True), strict=True):
         share, lower, upper = (first.sel(measure=measure, interval=side).values for side in ("estimate", "lower", "upper"))
@@ -150,11 +151,9 @@ def test_welded_sheets_are_refused_where_parts_have_to_be_rigid(tmp_path, analys
 
 def test_analyses_of_welded_sheets_in_contact_work_and_count_all_of_their_variance(tmp_path):
     """Total shares of independent deviations add up to one or more; contact makes them interact."""
-    model = welded(tmp_path, contact=True)
-    found = tc.analyses.contributions(model, samples=256, solver="graph")["total"].sel(state="corrected")
+    program = compiled(welded(tmp_path, contact=True), solver="graph")
+    found = tc.analyses.contributions(program, samples=256)["total"].sel(state="corrected")
     upper = found.sel(interval="upper").sum("group")
     assert (upper >= 1).all() and (found.sel(interval="lower").sum("group") <= 1.5).all()
-    moved = tc.analyses.sensitivities(model, samples=20, solver="graph")["sensitivity"].sel(
-        state="corrected", interval="estimate"
-    )
+    moved = tc.analyses.sensitivities(program, samples=20)["sensitivity"].sel(state="corrected", interval="estimate")
     assert np.isfinite(moved.values).all()
