@@ -12,7 +12,7 @@ from jsonschema import Draft202012Validator
 import tolcontact as tc
 from tests import cases
 from tests.cases import floating, toleranced
-from tests.helpers import assembly_of, json_schema, nightly, run
+from tests.helpers import PAPER, assembly_of, call, compiled, json_schema, nightly
 from tolcontact.errors import ScriptError
 from tolcontact.testing import assert_same_run
 
@@ -102,15 +102,16 @@ def test_models_come_back_exactly(name, tmp_path):
     again = assembly_of(tmp_path / "first.json")
     assert written(again, tmp_path / "second.json") == document
     if name in ("plain", "model"):
-        assert_same_run(*(tc.run(each, samples=200, surfaces=0, method={"resolution": "exact"}) for each in (model, again)))
+        programs = [compiled(each, method={"resolution": "exact"}) for each in (model, again)]
+        assert_same_run(*(tc.run(program, samples=200, surfaces=0) for program in programs))
 
 
 @pytest.mark.slow
 def test_what_is_left_out_has_the_value_that_a_script_would_have(tmp_path):
     (tmp_path / "stand.json").write_text(json.dumps(PLAIN))
-    done = run(["tolcontact", "run", tmp_path / "stand.json", "--samples", "50"])
+    done = call(tmp_path, "run", "stand.json", "--samples", "50")
     assert done.returncode == 0 and "height (mm): displacement, limits -0.5 to 0.5" in done.stdout
-    checked = run(["tolcontact", "check", tmp_path / "stand.json"])
+    checked = call(tmp_path, "check", "stand.json")
     assert "no faults found" in checked.stdout
 
 
@@ -145,7 +146,7 @@ def test_errors_state_the_place(document, said, tmp_path):
 def test_what_is_no_json_is_said(tmp_path):
     path = tmp_path / "model.json"
     path.write_text('{"name": ')
-    done = run(["tolcontact", "check", path])
+    done = call(tmp_path, "check", path)
     assert done.returncode == 2 and "cannot be read as JSON" in done.stderr and "Traceback" not in done.stderr
 
 
@@ -160,7 +161,7 @@ def test_a_mesh_without_a_file_cannot_be_named(tmp_path):
 
 def test_an_archive_does_not_name_files():
     """Of strangers' archives no file is read: shapes are in them."""
-    results = tc.run(cases.ra1(), samples=5, surfaces=0)
+    results = tc.run(compiled(cases.ra1(), method=PAPER), samples=5, surfaces=0)
     document = json.loads(str(results["model"].declaration.values))
     document["parts"][0]["geometry"] = {"file": "/etc/hostname"}
     results["model"]["declaration"] = xr.DataArray(json.dumps(document))
