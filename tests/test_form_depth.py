@@ -8,7 +8,7 @@ import tolcontact as tc
 from tests.cases import Frame
 from tests.cases.seats import sliding
 from tests.form_referee import Rectangle, deepest
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tolcontact.vocabulary import Status
 
 TURNED = Frame((0.4, -0.7, 0.3), (12.0, -5.0, 31.0))
@@ -43,8 +43,8 @@ def rectangles(frame=None):
     return rectangle(AT, BLOCK, -1), rectangle((0, 0, 10), TABLE, 1)
 
 
-def check(model, moving, reference, samples=30, **options):
-    run = tc.run(model, samples=samples, seed=3, fields="none", solver="daqp", surfaces=samples, **options)
+def check(model, moving, reference, samples=12):
+    run = tc.run(compiled(model, solver="graph"), samples=samples, seed=3, fields="none", surfaces=samples)
     certified = np.isin(run.status.values, (Status.UNTOUCHED, Status.RESOLVED))
     depths = deepest(run, moving, reference)[certified]
     allowed = model.smallest_zone() / 1000
@@ -57,7 +57,7 @@ def check(model, moving, reference, samples=30, **options):
 @pytest.mark.parametrize("spacing", [None, *nightly(1.2, 0.6)])
 @pytest.mark.parametrize(("faces", "whole"), [("block", False), ("table", False), ("table", True), ("block table", False)])
 def test_a_box_on_a_box(faces, whole, spacing):
-    check(box_on_box(faces, whole=whole, spacing=spacing), *rectangles(), samples=60 if spacing else 30)
+    check(box_on_box(faces, whole=whole, spacing=spacing), *rectangles(), samples=60 if spacing else 12)
 
 
 def test_a_box_on_a_box_that_stand_anywhere():
@@ -95,6 +95,6 @@ def feet(step):
 @pytest.mark.parametrize(("step", "certified"), [(0.0, 0.95), (0.02, 0.1)])
 def test_feet_of_a_body(step, certified):
     """Feet of one height touch the plane between contact points, too; of others, answers are compared alone."""
-    run = tc.run(feet(step), samples=60, seed=3, fields="none", solver="daqp", surfaces=60)
+    run = tc.run(compiled(feet(step), solver="graph"), samples=30, seed=3, fields="none", surfaces=30)
     assert np.isin(run.status.values, (Status.UNTOUCHED, Status.RESOLVED)).mean() > certified
     assert run["surface"].surface_penetration.max() < 0.1 / 1000

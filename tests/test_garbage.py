@@ -8,7 +8,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tolcontact.archive import ArchiveWriter, Run
 from tolcontact.statistics import DisplacementFields
 from tolcontact.testing import assert_gaps_recompute
@@ -26,9 +26,8 @@ class Results:
 
 
 @pytest.fixture
-def left(tmp_path):
+def left(archive):
     """Results in a list; another thread collects those that are taken out of it, at once."""
-    tc.run(cases.stack(), samples=100, seed=3, solver="daqp", out=tmp_path / "left.nc", surfaces=0).close()
     collected_by, done = set(), threading.Event()
 
     def collect():
@@ -37,7 +36,7 @@ def left(tmp_path):
 
     # xarray itself does not bear that one thread closes a file while another one opens one: all are opened before.
     gc.freeze()  # collecting takes no time that the run needs
-    files = [Results(tmp_path / "left.nc", collected_by) for _ in range(40)]
+    files = [Results(archive, collected_by) for _ in range(30)]
     collector = threading.Thread(target=collect)
     collector.start()
     yield files
@@ -51,17 +50,17 @@ def left(tmp_path):
 @pytest.mark.slow
 def test_files_may_be_closed_by_any_thread_while_rows_are_written(tmp_path, left):
     def drop(rows):
-        del left[:20]
+        del left[:15]
 
-    run = tc.run(cases.ra1(), samples=12_000, solver="daqp", out=tmp_path / "ra1.nc", surfaces=256, progress=drop)
+    run = tc.run(compiled(cases.ra1(), solver="daqp"), samples=9000, out=tmp_path / "ra1.nc", surfaces=256, progress=drop)
     run.close()
     assert_gaps_recompute(tmp_path / "ra1.nc")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("readings", [50, *nightly(150)])
+@pytest.mark.parametrize("readings", [30, *nightly(150)])
 def test_files_may_be_closed_by_any_thread_while_the_netcdf_library_reads(readings, tmp_path, left):
-    program = tc.build(cases.stack(), solver="daqp")
+    program = compiled(cases.stack(), solver="daqp")
     sizes = DisplacementFields(program.nominal, "none").sizes
     writer = ArchiveWriter(tmp_path / "stack.nc", program, Run(1, 1000, "all", 8, "none"), sizes)
     rows, *_ = writer.rows_to_check(1)

@@ -5,12 +5,17 @@ import pytest
 
 import tolcontact as tc
 from studies.certificates import optima
+from studies.certificates.coincidences import quick_builds
 from studies.certificates.least_poses import ALL, SEATING, Search, counted
 from studies.certificates.optima import case_scene, compared, ends_scene, judged, placed_scene, scene_of
 from tests.cases.ends import case
 from tests.helpers import nightly
 
-pytestmark = pytest.mark.filterwarnings("ignore::tolcontact.errors.NominalWarning")
+
+@pytest.fixture(autouse=True)
+def builds_are_quick():
+    with quick_builds():
+        yield
 
 
 @pytest.mark.parametrize("seeds", [range(6002, 6004), *nightly(*(range(first, first + 20) for first in range(6100, 6180, 20)))])
