@@ -18,7 +18,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, PAPER, assert_same_archive, call, nightly, posix_only, start
+from tests.helpers import COMMAND, PAPER, assert_same_archive, call, compiled, nightly, posix_only, start
 from tolcontact.errors import ClusterError
 from tolcontact.simulation import cluster
 from tolcontact.simulation.cluster import local_cluster, running_cluster
@@ -33,7 +33,7 @@ def client():
 
 
 @pytest.mark.parametrize(
-    ("name", "samples", "method"), [("ra1", 20_000, {}), *nightly(("ra2", 6000, {}), ("cells", 40, {"solver": "qpoases"}))]
+    ("name", "samples", "method"), [("ra1", 10_000, {}), *nightly(("ra2", 6000, {}), ("cells", 40, {"solver": "qpoases"}))]
 )
 def test_results_are_those_of_one_process(name, samples, method, client, tmp_path):
     options = {"samples": samples, "solver": "daqp", "surfaces": 4, **method}
@@ -68,9 +68,9 @@ def test_functions_of_users_and_plans_come_along(client, tmp_path):
 def test_contributions_and_sensitivities_are_those_of_one_process(client):
     a = cases.stack()
     a.correlate(["upper.A1", "middle.A1"], 0.8)
-    program = tc.build(a, solver="daqp")
+    program = compiled(a, solver="daqp")
     for ask in (tc.analyses.contributions, tc.analyses.sensitivities):
-        assert ask(program, samples=200, client=client).identical(ask(program, samples=200))
+        assert ask(program, samples=64, client=client).identical(ask(program, samples=64))
 
 
 @pytest.mark.nightly
@@ -96,9 +96,9 @@ def test_searches_and_comparisons_are_those_of_one_process(client):
 def test_a_worker_may_be_killed(seed, client, tmp_path):
     lot = random.Random(seed)
     whole, path = tmp_path / "whole.nc", tmp_path / "killed.nc"
-    options = {"samples": 24_000, "solver": "daqp", "surfaces": 4}
+    options = {"samples": 12_000, "solver": "daqp", "surfaces": 4}
     tc.run(cases.stack(), out=whole, **options).close()
-    killed, at = [], lot.randrange(1, 16_000)
+    killed, at = [], lot.randrange(1, 8_000)
 
     def kill(rows):
         if rows >= at and not killed:
@@ -122,7 +122,7 @@ def test_a_killed_run_goes_on_with_other_workers_and_leaves_none_behind(seed, tm
         "--surfaces",
         4,
         "--samples",
-        60_000,
+        30_000,
         "--keep",
         "poses",
         "--quiet",
@@ -139,7 +139,7 @@ def test_a_killed_run_goes_on_with_other_workers_and_leaves_none_behind(seed, tm
     gone, alive = psutil.wait_procs(children, timeout=20)
     assert not alive and len(gone) >= 2
     with tc.open_archive(path) as results:
-        assert results.sizes["realization"] < 60_000
+        assert results.sizes["realization"] < 30_000
     done = call(tmp_path, *options, path, "--resume", "--workers", "1")
     assert done.returncode == 0, done.stderr
     assert call(tmp_path, *options, whole).returncode == 0
@@ -158,7 +158,7 @@ def test_a_shard_that_fails_says_why_once(client, tmp_path):
                 raise tc.ModelError("wild", ['variable "heat" yields non-finite deviations'])
             return self.draws(seed=seed, start=start, stop=stop)
 
-    program = tc.build(cases.ra1(), solver="daqp")
+    program = compiled(cases.ra1(), solver="daqp")
     found = []
     with pytest.raises(tc.ModelError, match='variable "heat" yields') as raised:
         found.extend(cluster.Workers(client)(len, program, samples=40_000, seed=1, start=0, draws=Wild(program.draws)))
@@ -196,7 +196,7 @@ def test_what_cannot_be_is_told_in_one_line(options, said, tmp_path):
 
 
 def test_memory_of_the_client_does_not_grow(client):
-    program, received, memory = tc.build(cases.ra1(), solver="daqp", method=PAPER), [0], [0]
+    program, received, memory = compiled(cases.ra1(), solver="daqp", method=PAPER), [0], [0]
     own = psutil.Process()
     for block in cluster.Workers(client)(lambda b: b, program, samples=250_000, seed=1, start=0, draws=program.draws):
         received.append(received[-1] + sum(array.nbytes for array in vars(block).values() if isinstance(array, np.ndarray)))
