@@ -53,7 +53,7 @@ def block_of(mesh):
 def test_a_body_that_stands_twice_in_a_mesh_is_one_body():
     box = trimesh.creation.box(bounds=[(0, 0, 0), (50, 25, 10)])
     once, twice = (
-        tc.run(block_of(mesh), samples=20, seed=1, method=METHOD, surfaces=0).measured.values
+        tc.run(compiled(block_of(mesh), method=METHOD), samples=20, seed=1, surfaces=0).measured.values
         for mesh in (box, trimesh.util.concatenate([box, box.copy()]))
     )
     assert np.array_equal(once, twice)
@@ -72,29 +72,33 @@ def printed(summary):
     return console.export_text()
 
 
-def assert_right(model, bodies, samples, seed=1, solver="daqp", doubted=0):
-    counts, _ = judged(model, bodies, samples, seed, solver)
+def assert_right(program, bodies, samples, seed=1, doubted=0):
+    counts, _ = judged(program, bodies, samples, seed, None)
     assert {name: counts[name] for name in FAULTS} == dict.fromkeys(FAULTS, 0)
     assert counts["certified"] >= samples - doubted
     return counts
 
 
+ALIKE = ("chamfer without clearance", "needles", "steep cone", "ridge over an edge")  # others are much like these
+
+
 @pytest.mark.parametrize("samples", [30, *nightly(60)])
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [*(name for name in CASES if name not in ALIKE), *nightly(*ALIKE)])
 def test_every_certificate_holds_for_the_bodies(name, samples):
-    assert_right(program_of(name), nominal_case(name)[1], samples=samples, solver=None)
+    assert_right(program_of(name), nominal_case(name)[1], samples=samples)
 
 
 @pytest.mark.parametrize("name", ["dovetail", "pin at a rim", *nightly("nut over a washer")])
 def test_no_certificate_of_whole_bodies_is_wrong(name):
     """A nut over a washer's rim, a key in a dovetail, a pin that leaves its hole."""
-    assert_right(*whole_case(name), samples=60)
+    model, bodies = whole_case(name)
+    assert_right(compiled(model, solver="daqp"), bodies, samples=30)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["cone", *nightly("crossing roofs", "needles, tilted")])
 def test_another_solver_certifies_the_same(name):
-    assert_right(program_of(name, solver="qpoases"), nominal_case(name)[1], samples=40, solver=None)
+    assert_right(program_of(name, solver="qpoases"), nominal_case(name)[1], samples=40)
 
 
 def test_fixed_planes_would_have_been_wrong():
@@ -113,7 +117,8 @@ def test_a_plate_that_slides_clear_of_a_chamfered_block_is_never_touched(selecti
         model, _ = case("chamfer without clearance")
         block, plate = model.parts
         model.contact("top alone", moving=plate.face("-z"), reference=block.face(selection))
-    run = tc.run(model, samples=300, seed=2, surfaces=0, fields="none")
+        model = compiled(model)
+    run = tc.run(model, samples=100, seed=2, surfaces=0, fields="none")
     assert (run.status == 0).all()
     assert np.array_equal(run.measured.sel(state="raw"), run.measured.sel(state="corrected"))
 
@@ -121,13 +126,14 @@ def test_a_plate_that_slides_clear_of_a_chamfered_block_is_never_touched(selecti
 @pytest.mark.slow
 def test_few_points_over_a_rib_lose_nothing():
     """Three points in a row: about their line the plate may turn far, at no cost to the objective; that is not certified."""
-    assert_right(*case("rib", points=20), samples=60, doubted=2)
+    model, bodies = case("rib", points=20)
+    assert_right(compiled(model, solver="daqp"), bodies, samples=60, doubted=2)
 
 
 def test_the_frame_does_not_matter(name="rib"):  # whose contact points are the same in every frame
     """Locators, contact and the measured point turn with the assembly; the distance that contact moves the point stays."""
     places = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), ((0.3, -0.5, 1.1), (300.0, -200.0, 100.0))
-    runs = [tc.run(case(name, turn=turn, shift=shift)[0], samples=60, surfaces=0) for turn, shift in places]
+    runs = [tc.run(compiled(case(name, turn=turn, shift=shift)[0]), samples=60, surfaces=0) for turn, shift in places]
     assert np.array_equal(runs[0].status, runs[1].status)
     shifts = [(run.measured.sel(state="corrected") - run.measured.sel(state="raw")).values for run in runs]
     lengths = [np.linalg.norm(shift, axis=1) for shift in shifts]
@@ -135,17 +141,17 @@ def test_the_frame_does_not_matter(name="rib"):  # whose contact points are the 
 
 
 # In scene 38 bodies penetrate by a thousandth of the tolerance range at an edge, where the complete test sees them apart.
-@pytest.mark.parametrize("seed", [2, 4, 8, 38, *nightly(0, 6, *range(10, 24, 2))])
+@pytest.mark.parametrize("seed", [8, 38, *nightly(0, 2, 4, 6, *range(10, 24, 2))])
 def test_random_bodies(seed):
     assembly, bodies = scene(seed)
-    assert_right(assembly, bodies, 4, seed)
+    assert_right(compiled(assembly, solver="daqp"), bodies, 4, seed)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [3, 7, 9, *nightly(1, 5, *range(11, 24, 2))])
+@pytest.mark.parametrize("seed", [7, *nightly(1, 3, 5, *range(9, 24, 2))])
 def test_random_unions_of_bodies(seed):
     assembly, bodies = scene(seed)
-    assert_right(assembly, bodies, 4, seed)
+    assert_right(compiled(assembly, solver="daqp"), bodies, 4, seed)
 
 
 def test_a_bounded_search_needs_the_exact_resolution():
@@ -186,13 +192,13 @@ def stand():
 
 
 def test_flat_faces_whose_overlap_stays_keep_their_fixed_points():
-    program = tc.build(stand())
+    program = compiled(stand())
     assert not program.meetings
     assert program.trials[0].error < program.trials[0].allowed
 
 
 def test_contact_of_faces_that_do_not_end_is_not_called_false():
-    run = tc.run(stand(), samples=200, seed=3, method=tc.Method())
+    run = tc.run(compiled(stand(), method=tc.Method()), samples=200, seed=3)
     assert (run.status == 1).any()
     assert float(tc.summarize(run).false_contact.max()) == 0
 
@@ -245,14 +251,14 @@ def test_faces_under_load_touch(blocks, samples, solver):
 
 def test_answers_do_not_depend_on_which_of_two_near_places_carries():
     """In this realization, places of two kinds nearly coincide, and solvers let different ones carry in the first step."""
-    programs = [tc.build(tower.assembly(6), solver=solver) for solver in ("daqp", "graph")]
+    programs = [compiled(tower.assembly(6), solver=solver) for solver in ("daqp", "graph")]
     daqp, graph = (simulate_block(p, p.draws(seed=1, start=366, stop=367)) for p in programs)
     assert daqp.status.tolist() == graph.status.tolist() == [tc.Status.RESOLVED]
     assert graph.poses == pytest.approx(daqp.poses, abs=1e-9)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("blocks", [24, *nightly(48)])
+@pytest.mark.parametrize("blocks", [12, *nightly(24, 48)])
 def test_rounds_of_a_step_do_not_grow_with_the_bodies(blocks):
     """Which places wait beside a deeper one hangs on how far deviations move a pair, not on the length of the chain."""
     program = compiled(tower.assembly(blocks), solver="graph")
