@@ -8,7 +8,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call, compiled, nightly
+from tests.helpers import PAPER, call, compiled, nightly
 from tests.test_report import data_of
 from tolcontact.report import write_comparison
 
@@ -23,7 +23,7 @@ def lifted(by, name="top", tolerance=None):
 
 
 def run_of(model, **options):
-    return tc.run(compiled(model, solver="daqp"), surfaces=0, **options)
+    return tc.run(compiled(model, solver="daqp", method=PAPER), surfaces=0, fields="none", **options)
 
 
 @pytest.fixture(scope="module")
