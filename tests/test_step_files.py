@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tolcontact as tc
-from tests.helpers import simulate
+from tests.helpers import compiled, simulate
 from tests.shapes import patch, refusal, shape
 from tests.step_files import Step, assembly, corners, step_block, step_of
 
@@ -33,39 +33,68 @@ SEVERAL = {
 }
 
 
+LONG = "\x1b[31m red \n" + 300 * "long "
+REFUSED = {
+    **{kind: content for kind, (content, _) in SEVERAL.items()},
+    "long names": step_of(("solid", (0, 0, 0), (1, 1, 1), LONG), ("solid", (2, 0, 0), (3, 1, 1), LONG)),
+    "two pins": assembly(("pin", (0, 0, 0)), ("pin", (5, 0, 0))),
+    "a set and a pin": assembly(("set", (0, 0, 0)), ("pin", (50, 0, 0))),
+    "many": step_of(*[("solid", (2 * k, 0, 0), (2 * k + 1, 1, 1)) for k in range(15)]),
+    "without a face": re.sub(r"PLANE\('',#\d+\)", "PLANE('',#1)", step_block(), count=1),
+}
+
+
+def model_of(contents, folder):
+    """A model whose fixed parts are of files of some contents, by name: one process reads all of them."""
+    model = tc.Assembly("files")
+    for name, content in contents.items():
+        path = folder / f"{name}.step"
+        path.write_text(content)
+        part = model.part(name, tc.Mesh(path), fixed=True)
+    model.measure("x", part.point(0, 0, 0), along="x")
+    return model
+
+
+@pytest.fixture(scope="module")
+def refusals(tmp_path_factory):
+    """What is said of each file, by the name of its part."""
+    faults = tc.check(model_of(REFUSED, tmp_path_factory.mktemp("refused")))
+    assert len(faults) == len(REFUSED) and all(len(fault) < 2500 and "\n" not in fault for fault in faults)
+    found = {name: [fault for fault in faults if f'part "{name}"' in fault] for name in REFUSED}
+    assert all(f"{name}.step" in fault for name, (fault,) in found.items())
+    return {name: fault for name, (fault,) in found.items()}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", SEVERAL)
-def test_a_step_file_of_several_bodies_is_refused_with_their_list(kind, tmp_path):
-    content, expected = SEVERAL[kind]
-    said = refusal(tmp_path / "many.step", content)
+def test_a_step_file_of_several_bodies_is_refused_with_their_list(kind, refusals):
+    said, (_, expected) = refusals[kind], SEVERAL[kind]
     assert "holds 2 bodies" in said and "or declare all with tc.io.parts_from" in said
     for words in expected:
         assert words in said
 
 
-def test_names_in_a_file_do_not_spoil_a_message(tmp_path):
-    long = "\x1b[31m red \n" + 300 * "long "
-    content = step_of(("solid", (0, 0, 0), (1, 1, 1), long), ("solid", (2, 0, 0), (3, 1, 1), long))
-    said = refusal(tmp_path / "named.step", content)
+def test_names_in_a_file_do_not_spoil_a_message(refusals):
+    said = refusals["long names"]
     assert "\x1b" not in said and "[31m red long long" in said and len(said) < 500
 
 
-def test_the_bodies_of_an_assembly_stand_in_their_places(tmp_path):
-    said = refusal(tmp_path / "two.step", assembly(("pin", (0, 0, 0)), ("pin", (5, 0, 0))))
+def test_the_bodies_of_an_assembly_stand_in_their_places(refusals):
+    said = refusals["two pins"]
     assert "holds 2 bodies" in said
     assert '1. "use 0", 5 x 5 x 5 mm at (2.5, 2.5, 2.5)' in said and '2. "use 1", 5 x 5 x 5 mm at (7.5, 2.5, 2.5)' in said
 
 
-def test_touching_solids_of_one_product_are_told_apart(tmp_path):
-    said = refusal(tmp_path / "four.step", assembly(("set", (0, 0, 0)), ("pin", (50, 0, 0))))
+def test_touching_solids_of_one_product_are_told_apart(refusals):
+    said = refusals["a set and a pin"]
     assert "holds 4 bodies" in said
     places = ("10 x 10 x 10 mm at (5, 5, 5)", "10 x 10 x 10 mm at (15, 5, 5)", "30 x 30 x 30 mm at (15, 15, 35)")
     for place in (*places, "5 x 5 x 5 mm at (52.5, 2.5, 2.5)"):
         assert place in said
 
 
-def test_many_bodies_are_counted_and_the_first_of_them_listed(tmp_path):
-    said = refusal(tmp_path / "many.step", step_of(*[("solid", (2 * k, 0, 0), (2 * k + 1, 1, 1)) for k in range(15)]))
+def test_many_bodies_are_counted_and_the_first_of_them_listed(refusals):
+    said = refusals["many"]
     assert "holds 15 bodies" in said and "12. without a name" in said and said.endswith("and 3 more (see tolcontact bodies)")
 
 
@@ -78,12 +107,17 @@ ONE = {
 }
 
 
+@pytest.fixture(scope="module")
+def meshes(tmp_path_factory):
+    """The mesh of each file, by the name of its part."""
+    model = model_of({kind: content for kind, (content, _, _) in ONE.items()}, tmp_path_factory.mktemp("one"))
+    return {part.part.name: part.mesh for part in compiled(model).nominal.parts}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ONE)
-def test_one_body_is_read_whatever_it_consists_of(kind, tmp_path):
-    content, volume, closed = ONE[kind]
-    (tmp_path / "one.step").write_text(content)
-    mesh = shape(tc.Mesh(tmp_path / "one.step"))
+def test_one_body_is_read_whatever_it_consists_of(kind, meshes):
+    (_, volume, closed), mesh = ONE[kind], meshes[kind]
     assert mesh.is_watertight == closed
     assert volume is None or mesh.volume == pytest.approx(volume)
 
@@ -108,9 +142,8 @@ def cut_corner(size, cut):
     return own, faces
 
 
-def test_a_solid_that_lost_a_face_is_not_taken_for_a_sheet(tmp_path):
-    content = re.sub(r"PLANE\('',#\d+\)", "PLANE('',#1)", step_block(), count=1)
-    said = refusal(tmp_path / "holed.step", content)
+def test_a_solid_that_lost_a_face_is_not_taken_for_a_sheet(refusals):
+    said = refusals["without a face"]
     assert "do not close" in said and "5 of 6 faces" in said
 
 
