@@ -5,6 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import compiled
 from tests.test_report import data_of
 from tolcontact.report import write_page
 from tolcontact.statistics import touching
@@ -12,7 +13,7 @@ from tolcontact.vocabulary import TOUCHING_GAP
 
 
 def test_figures_are_those_of_the_rows():
-    results = tc.run(cases.stack(), samples=400, seed=2, solver="daqp", surfaces=0)
+    results = tc.run(compiled(cases.stack(), solver="daqp"), samples=400, seed=2, surfaces=0, fields="none")
     summary = tc.summarize(results)
     reaction, carries = results["reaction"].values, results["carrying"].values > 0
     of = summary["reaction"].sel(interval="estimate")
@@ -30,7 +31,7 @@ def test_figures_are_those_of_the_rows():
 @pytest.mark.parametrize("name", ["lid", "door"])
 def test_points_touch_where_the_least_gap_is_closed(name):
     """A pair whose least gap is closed has a point that touches, and no other has."""
-    results = tc.run(cases.MODELS / f"{name}.py", samples=40, seed=3, solver="daqp", surfaces=0)
+    results = tc.run(compiled(cases.MODELS / f"{name}.py", solver="daqp"), samples=40, seed=3, surfaces=0)
     found, held = touching(results), results["searched"].values == 0
     assert found.attrs["realizations"] == held.sum()
     closed = (results["gap_min"].values[held, 1] < TOUCHING_GAP).mean(axis=0)
@@ -41,7 +42,7 @@ def test_points_touch_where_the_least_gap_is_closed(name):
 
 
 def test_archives_without_poses_say_nothing_of_points():
-    results = tc.run(cases.stack(), samples=30, solver="daqp", keep="measures", surfaces=0)
+    results = tc.run(compiled(cases.stack(), solver="daqp"), samples=30, keep="measures", surfaces=0)
     found = touching(results)
     assert found.attrs["realizations"] == 0 and np.isnan(found["touching"]).all()
     assert int(results["contact/touching_realizations"]) == 0 and np.isnan(results["contact/touching"]).all()
@@ -49,7 +50,7 @@ def test_archives_without_poses_say_nothing_of_points():
 
 @pytest.mark.slow
 def test_the_page_shows_where_contact_is(tmp_path, open_page):
-    results = tc.run(cases.ra1(), samples=200, solver="daqp", surfaces=0)
+    results = tc.run(compiled(cases.ra1(), solver="daqp"), samples=200, surfaces=0)
     write_page(results, tc.summarize(results), tmp_path / "ra1.html")
     opened = open_page(tmp_path / "ra1.html")
     opened.select_option("#field", "touching")

@@ -160,11 +160,12 @@ def test_joints_of_elastic_parts_need_points_that_are_no_hinge(tmp_path):
 
 def test_sensitivities_and_contributions_of_tips_are_those_of_their_stiffness(tmp_path):
     """The height is (k1 d1 + k2 d2) / (k1 + k2) of the roots' heights d; a hundredth of a mm leaves squares of 1e-5."""
-    model, causes, slopes = tips(tmp_path), ["left root", "right root"], np.array([1.05, 8.4]) / 9.45
-    found = tc.analyses.sensitivities(model, samples=40)["sensitivity"]
+    causes, slopes = ["left root", "right root"], np.array([1.05, 8.4]) / 9.45
+    program = compiled(tips(tmp_path))
+    found = tc.analyses.sensitivities(program, samples=40)["sensitivity"]
     where = {"measure": "left tip", "state": "corrected", "interval": "estimate"}
     assert found.sel(contributor=causes, **where).values == pytest.approx(slopes, abs=1e-4)
-    first = tc.analyses.contributions(model, samples=2048)["first"].sel(measure="left tip", state="corrected", group=causes)
+    first = tc.analyses.contributions(program, samples=2048)["first"].sel(measure="left tip", state="corrected", group=causes)
     exact = slopes**2 / (slopes**2).sum()
     assert (first.sel(interval="lower").values <= exact).all()
     assert (first.sel(interval="upper").values >= exact).all()

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tests.cases import Frame, toleranced
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tests.population_referee import measured_back
 from tests.shapes import shape
 from tolcontact.discretization import discretize
@@ -30,7 +30,7 @@ def drawn(results, label):
 
 @pytest.mark.parametrize("frame", [toleranced.STILL, MOVED], ids=["still", "moved"])
 def test_points_of_a_plane_move_as_its_offset_and_tilts_say(frame):
-    results = tc.run(toleranced.block_with("top", tc.Profile(0.3, "A|B|C"), frame=frame), samples=500)
+    results = tc.run(compiled(toleranced.block_with("top", tc.Profile(0.3, "A|B|C"), frame=frame)), samples=500)
     z, a, b = (drawn(results, f"block.top.{name}") for name in ("offset", "tilt x", "tilt y"))
     measured = results.measured.sel(state="raw")
     expected = {"corner": z + a + b, "middle": z, "edge": z + a}
@@ -40,7 +40,7 @@ def test_points_of_a_plane_move_as_its_offset_and_tilts_say(frame):
 
 
 def test_spread_of_a_measure_is_that_of_the_closed_form():
-    results = tc.run(toleranced.block_with("top", tc.Profile(0.3, "A")), samples=20_000)
+    results = tc.run(compiled(toleranced.block_with("top", tc.Profile(0.3, "A"))), samples=20_000, fields="none")
     summary = tc.summarize(results)["statistic_value"].sel(state="raw", statistic="standard deviation")
     for name, count in {"corner": 3, "edge": 2, "middle": 1}.items():
         estimate, low, high = summary.sel(measure=name).values  # twice the interval: three of them are tested
@@ -49,7 +49,7 @@ def test_spread_of_a_measure_is_that_of_the_closed_form():
 
 
 def test_a_line_profile_is_that_of_the_surface_and_an_archive_has_it(tmp_path):
-    surface = tc.run(toleranced.block_with("top", tc.Profile(0.3, "A")), samples=500)
+    surface = tc.run(compiled(toleranced.block_with("top", tc.Profile(0.3, "A"))), samples=500)
     results = tc.run(toleranced.block_with("top", tc.LineProfile(0.3, "A")), samples=500, out=tmp_path / "lines.nc")
     assert np.array_equal(results.measured.values, surface.measured.values)
     offset = results["sample"].sel(contributor="block.top.offset")
@@ -70,7 +70,7 @@ def test_opposed_planes_share_their_size_and_their_middle():
             a.locate(wall, tc.three_two_one(wall.face("-z"), wall.face("-y"), wall.face("-x")), tolerance=0)
             a.contact(name, moving=wall.face("-y" if name == "up" else "+y"), reference=tab.face(face), within=20)
         a.measure("x", tab.point(0, 0, 0), along="x")
-        program = tc.build(a)
+        program = compiled(a)
         block = simulate_block(program, program.draws(seed=1, start=0, stop=50))
         labels = program.nominal.contributors
         size = block.deviations[:, labels.index("tab.width.size")]
@@ -116,7 +116,7 @@ def test_locators_follow_the_faces_that_they_stand_against():
         for name, point in {"middle": (25, 15, 0), "corner": (0, 0, 0)}.items():
             a.measure(f"{part.name} {name}", part.point(*point), along="z")
     a.measure("stays", foot.point(25, 15, 0), along="z")
-    results = tc.run(a, samples=300)
+    results = tc.run(compiled(a), samples=300)
     measured = results.measured.sel(state="raw")
     for name in ("p0", "p1"):
         z, x, y = (drawn(results, f"{name}.foot.{freedom}") for freedom in ("offset", "tilt x", "tilt y"))
@@ -136,7 +136,7 @@ def test_supports_follow_their_faces_too():
     a.locate(table, [*feet, *(tc.Locator(f"S{k}", p, d, 0) for k, (p, d) in enumerate(rest))])
     a.force("weight", at=table.point(20, 15, 5), vector=(0, 0, -9))
     a.measure("foot", foot.point(20, 15, 0), along="z")
-    results = tc.run(a, samples=200)
+    results = tc.run(compiled(a), samples=200)
     assert_resolved(results)
     assert_gaps_recompute(results)
 
@@ -155,13 +155,13 @@ def test_one_feature_deviates_once_whatever_uses_it():
     a.contact("seat", moving=upper.face("-z"), reference=lower.face("+z"))
     a.measure("gap", top.point(60, 40, 10), to=foot.point(60, 40, 0), along="z")
     a.measure("expression", lambda poses: (poses.position(foot.point(60, 40, 0)) - poses.position(top.point(60, 40, 10)))[2])
-    results = tc.run(a, samples=2000, method=EXACT, solver="daqp")
+    results = tc.run(compiled(a, method=EXACT, solver="daqp"), samples=500)
     assert_resolved(results)
     assert_gaps_recompute(results)
     gap, same = results.measured.values[:, 1].T
     assert np.abs(gap - same).max() < 1e-12 and gap.min() > -1e-4  # corners slide over tilted planes: second order
     assert float(results["surface"].surface_penetration.max()) < 0.05 / 2000
-    rebuilt = tc.run(tc.io.model_of(results), samples=2000, method=EXACT, solver="daqp")
+    rebuilt = tc.run(compiled(tc.io.model_of(results), method=EXACT, solver="daqp"), samples=500)
     assert_same_run(results, rebuilt)
 
 
@@ -181,7 +181,7 @@ def test_diameters_vary_as_offsets(points, solver):
     reach = {} if points is None else {"points": points, "within": 12}
     a.contact("foot", moving=skin, reference=plate.face("+z"), **reach)
     a.measure("height", ball.point(0, 0, 0), along="z")
-    results = tc.run(a, samples=200, solver=solver)
+    results = tc.run(compiled(a, solver=solver), samples=60)
     assert_resolved(results)
     assert_gaps_recompute(results)
     expected = drawn(results, "ball.skin.size") / 2
@@ -193,7 +193,7 @@ def test_diameters_vary_as_offsets(points, solver):
 
 
 def test_axes_of_an_archive_are_where_the_position_says():
-    results = tc.run(toleranced.ring_with("bore", tc.Position(0.2, "A|B")), samples=300)
+    results = tc.run(compiled(toleranced.ring_with("bore", tc.Position(0.2, "A|B"))), samples=300)
     x = drawn(results, "ring.bore.shift x") + drawn(results, "ring.bore.tilt x")
     assert np.abs(results.measured.sel(state="raw", measure="x").values - x).max() < 1e-6
 
@@ -245,7 +245,7 @@ def test_features_of_a_step_file_and_of_its_mesh_agree(hole):
         )
         own = part.feature("hole", wall, tc.Size(8.1, 0.03), tc.Position(0.2, "A|B|C"))
         a.measure("x", own.axis(1), along="x")
-        program = tc.build(a)
+        program = compiled(a)
         feature = program.nominal.features[-1].geometry
         found.append((feature.centre, feature.axis, feature.half, feature.size, [c.spread for c in program.draws.contributors]))
     for one, other in zip(*found, strict=True):
@@ -255,7 +255,7 @@ def test_features_of_a_step_file_and_of_its_mesh_agree(hole):
 def test_a_summary_says_that_a_datum_shift_is_not_drawn():
     a = toleranced.ring_with("bore", tc.Position(0.2, "A|B(M)"))
     console = Console(width=200, file=io.StringIO())
-    console.print(summary_text(tc.summarize(tc.run(a, samples=20))))
+    console.print(summary_text(tc.summarize(tc.run(compiled(a), samples=20))))
     said = console.file.getvalue()
     assert "datum shift of ring.bore: not drawn; contact of the datum features determines it" in said
 
@@ -317,7 +317,7 @@ def test_regions_of_one_face_are_features_of_their_own():
         a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=0)
         a.contact(name, moving=block.face("-z"), reference=base.face("+z", left if x < 50 else right))
         a.measure(name, block.point(0, 0, 0), along="z")
-    moved = tc.run(a, samples=100, solver="daqp", method=EXACT).measured.sel(state="corrected").values
+    moved = tc.run(compiled(a, solver="daqp", method=EXACT), samples=100).measured.sel(state="corrected").values
     assert np.abs(moved[:, 0]).max() > 0.1 and np.abs(moved[:, 1]).max() == 0
     base.feature("right", base.face("+z", right), tc.Profile(0.5, "A"))
     assert not tc.check(a)
@@ -332,7 +332,7 @@ def test_points_and_locators_of_a_pair_of_planes_are_on_their_own_face():
     a.locate(tab, [*(tc.Locator(f"R{k}", p, d, 0) for k, (p, d) in enumerate(rest)), *sides])
     a.measure("width", width.point(10, 0, 4), to=width.point(10, 10, 4), along="y")
     a.measure("low", width.point(10, 0, 4), along="y")
-    results = tc.run(a, samples=100)
+    results = tc.run(compiled(a), samples=100)
     size, measured = drawn(results, "tab.width.size"), results.measured.sel(state="raw")
     assert np.abs(measured.sel(measure="width") - 10 - size).max() < 1e-9  # from low to high
     assert np.abs(measured.sel(measure="low")).max() < 1e-9  # it stands against its locators

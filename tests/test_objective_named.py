@@ -9,7 +9,7 @@ from rich.console import Console
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import FIXED, PAPER
+from tests.helpers import FIXED, PAPER, compiled
 from tolcontact.report import summary_text
 
 SAMPLES = 1000  # runs from this number on are compared with other objectives
@@ -75,7 +75,7 @@ def test_a_model_with_forces_is_seated_unless_it_has_a_method_and_says_so_if_it_
 
 
 def test_an_offset_is_the_largest_motion_along_a_locator():
-    run = tc.run(cases.model("ra1"), samples=50, seed=3, surfaces=0)
+    run = tc.run(compiled(cases.model("ra1")), samples=50, seed=3, surfaces=0)
     sample, top = run["sample"].to_dataset(), {"part": "top"}
     is_top = [str(label).startswith("top.") for label in sample.locator.values]
     points, directions = sample.locator_point.values[is_top], sample.locator_direction.values[is_top]
@@ -88,14 +88,15 @@ def test_an_offset_is_the_largest_motion_along_a_locator():
 
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory):
-    return tc.run(cases.model("ra1"), samples=SAMPLES, seed=1, solver="daqp", fields="none", surfaces=0)
+    return tc.run(compiled(cases.model("ra1"), solver="daqp"), samples=SAMPLES, seed=1, fields="none", surfaces=0)
 
 
 def test_the_first_draws_have_the_results_of_runs_with_the_other_objectives(compared):
     group = compared["objectives"].to_dataset()
     assert group.by_objective.values.tolist() == ["active points", "all points", "locator stiffness"]
     for objective in group.by_objective.values:
-        alone = tc.run(cases.model("ra1"), samples=128, seed=1, solver="daqp", surfaces=0, method={"objective": objective})
+        program = compiled(cases.model("ra1"), solver="daqp", method={"objective": objective})
+        alone = tc.run(program, samples=128, seed=1, surfaces=0)
         kept = group.sel(by_objective=objective)
         assert np.array_equal(kept.measured_by_objective, alone.measured.sel(state="corrected"))
         assert np.array_equal(kept.status_by_objective, alone.status)
@@ -115,16 +116,16 @@ def test_a_figure_without_an_interval_is_not_said_to_depend_on_the_convention(co
 
 
 def test_nothing_is_compared_where_forces_decide_or_a_run_is_short():
-    assert "objectives" not in tc.run(weighed(), samples=20, surfaces=0).children
-    short = tc.summarize(tc.run(cases.model("ra1"), samples=100, method=PAPER, surfaces=0))
+    assert "objectives" not in tc.run(compiled(weighed()), samples=20, surfaces=0).children
+    short = tc.summarize(tc.run(compiled(cases.model("ra1"), method=PAPER), samples=100, surfaces=0))
     assert not short.compared_by_objective.any()
 
 
 def test_a_lid_that_is_lifted_until_its_holes_clear_the_dowels_is_reported():
     """Without the seat nothing says that it cannot lie askew in the base; RA1's top goes no further than explained."""
-    summary = tc.summarize(tc.run(pinned(seat=False), samples=40, solver="daqp", surfaces=0, method=FIXED))
+    summary = tc.summarize(tc.run(compiled(pinned(seat=False), solver="daqp", method=FIXED), samples=40, surfaces=0))
     assert summary.offset_unexplained.sel(part="lid", interval="lower") > 0.1
     assert "contact moved parts far off their locators: lid" in " ".join(printed(summary).split())
     assert "advice: say what holds them" in printed(summary)
-    usual = tc.summarize(tc.run(cases.model("ra1"), samples=100, surfaces=0))
+    usual = tc.summarize(tc.run(compiled(cases.model("ra1")), samples=100, surfaces=0))
     assert usual.offset_unexplained.sel(part="top", interval="estimate") == 0

@@ -8,14 +8,14 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import ROOT, call
+from tests.helpers import PAPER, ROOT, call, compiled
 from tolcontact.replacing import replacing
 
 
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
     path = tmp_path_factory.mktemp("archive") / "run.nc"
-    tc.run(cases.stack(), samples=50, solver="daqp", out=path).close()
+    tc.run(compiled(cases.stack(), solver="daqp", method=PAPER), samples=50, out=path).close()
     return path
 
 
@@ -52,7 +52,7 @@ def test_nothing_is_written_through_a_planted_link(archive, tmp_path):
         (tmp_path / name).symlink_to(treasure)
     assert call(ROOT, "report", archive, "--out", tmp_path / "page.html").returncode == 0
     with pytest.raises(tc.errors.ArchiveError, match="cannot be written"):
-        tc.run(cases.stack(), samples=10, solver="daqp", out=tmp_path / "run.nc")
+        tc.run(compiled(cases.stack(), method=PAPER), samples=10, out=tmp_path / "run.nc")
     assert treasure.read_text() == "gold"
 
 

@@ -11,7 +11,7 @@ from rich.console import Console
 from scipy import stats
 
 import tolcontact as tc
-from tests.helpers import call
+from tests.helpers import call, compiled
 from tolcontact.report import analysis_text
 from tolcontact.vocabulary import STACK_UP
 
@@ -76,7 +76,7 @@ def test_a_dimension_is_shown_as_drawn_and_as_centred():
 
 
 def test_sensitivities_and_shared_links_have_the_moments_of_their_sums():
-    results = tc.run(brackets(), samples=20_000, seed=3)
+    results = tc.run(compiled(brackets()), samples=20_000, seed=3)
     first, second = results.measured.sel(state="corrected").values.T
     left, right = 0.4 / 6, 0.4 / 1.33 / 6
     uniform, shift = 0.3 / math.sqrt(12), 0.2 * (1 - 1 / 1.33)
@@ -133,14 +133,16 @@ def test_a_form_has_three_sigma_in_rss_and_no_worst_case():
     model.variable("width", 0.6, nominal=3)
     figures = tc.analyses.stack_up(model, samples=6000)
     worst, rss, mrss, _ = figures.half_width.sel(measure="height").values
-    spread = float(tc.run(model, samples=6000).measured.sel(measure="height", state="raw").std())
+    spread = float(
+        tc.run(compiled(model), samples=6000, fields="none", surfaces=0).measured.sel(measure="height", state="raw").std()
+    )
     assert math.isnan(worst) and math.isnan(mrss) and abs(rss / (3 * spread) - 1) < 4 / math.sqrt(2 * 6000)
     assert figures.forms.values.tolist() == [1, 0]
     assert np.allclose(figures.half_width.sel(measure="size").values[:3], 0.3)
 
 
 def test_a_chain_of_an_assembly_is_its_measure_until_contact_moves_parts():
-    measured = tc.run(stand(), samples=400, seed=2).measured.transpose("measure", "state", "realization")
+    measured = tc.run(compiled(stand()), samples=400, seed=2).measured.transpose("measure", "state", "realization")
     (raw, corrected), (drawn, still) = measured.values
     assert np.abs(raw - drawn).max() < 3e-4  # of second order in the tilt, (0.26 / 15)^2
     assert np.array_equal(drawn, still) and (corrected > raw + 1e-3).mean() > 0.3
@@ -177,7 +179,7 @@ def test_the_page_has_the_loop_the_figures_and_the_dimensions(tmp_path):
 def test_a_stack_has_all_analyses():
     stack = brackets()
     stack.gap("limited", {"shared": 1, "left": 1}, limits=(13.6, 14.2))
-    program = tc.build(stack)
+    program = compiled(stack)
     shares = tc.analyses.contributions(program, samples=512).linear.sel(measure="first").values
     variances = np.array([0.3**2 / 12, 0.25 * (0.4 / 6) ** 2])
     assert np.allclose(sorted(shares)[-2:], sorted(variances / variances.sum()), atol=0.02)
@@ -235,9 +237,9 @@ def test_measured_links_of_a_table_have_the_intervals_of_their_parts(tmp_path):
     summaries = []
     for model in (stack, scripted):
         model.gap("play")
-        summaries.append(tc.summarize(tc.run(model, samples=2000, seed=1)).statistic_value.values)
+        summaries.append(tc.summarize(tc.run(compiled(model), samples=2000, seed=1)).statistic_value.values)
     assert np.allclose(*summaries, rtol=1e-9, atol=1e-12, equal_nan=True)
-    assert tc.build(stack).draws.in_words == tc.build(scripted).draws.in_words != []
+    assert compiled(stack).draws.in_words == compiled(scripted).draws.in_words != []
 
 
 @pytest.mark.parametrize(
@@ -310,7 +312,7 @@ def test_a_stack_of_uniform_links_has_the_density_of_irwin_and_hall():
     for k in range(3):
         stack.link(f"disc {k}", 5, tc.Tolerance(1.0, "uniform"))
     stack.gap("height", limits=(None, 15.9))
-    results = tc.run(stack, samples=40_000, seed=5)
+    results = tc.run(compiled(stack), samples=40_000, seed=5)
     share = float((results.measured.sel(state="corrected") > 15.9).mean())
     expected = (3 - 2.4) ** 3 / 6  # of the sum of three uniform numbers beyond 2.4
     assert stats.binomtest(round(share * 40_000), 40_000, expected).pvalue > 1e-4
