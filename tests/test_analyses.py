@@ -39,7 +39,7 @@ def archive(run_of_ra1, tmp_path):
 @pytest.mark.slow
 def test_an_archive_keeps_what_was_asked_of_its_model(ra1, archive):
     kept = {
-        "contributions": tc.analyses.contributions(ra1, samples=1024, into=archive),
+        "contributions": tc.analyses.contributions(ra1, samples=256, into=archive),
         "sensitivities": tc.analyses.sensitivities(ra1, samples=16, into=archive),
         "worst_case": tc.analyses.worst_case(ra1, samples=16, into=archive),
         "tails": tc.analyses.tails(ra1, samples=30_000, into=archive),

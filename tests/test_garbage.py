@@ -36,7 +36,7 @@ def left(archive):
 
     # xarray itself does not bear that one thread closes a file while another one opens one: all are opened before.
     gc.freeze()  # collecting takes no time that the run needs
-    files = [Results(archive, collected_by) for _ in range(30)]
+    files = [Results(archive, collected_by) for _ in range(20)]
     collector = threading.Thread(target=collect)
     collector.start()
     yield files
@@ -50,7 +50,7 @@ def left(archive):
 @pytest.mark.slow
 def test_files_may_be_closed_by_any_thread_while_rows_are_written(tmp_path, left):
     def drop(rows):
-        del left[:15]
+        del left[:10]
 
     run = tc.run(compiled(cases.ra1(), solver="daqp"), samples=9000, out=tmp_path / "ra1.nc", surfaces=256, progress=drop)
     run.close()
@@ -58,7 +58,7 @@ def test_files_may_be_closed_by_any_thread_while_rows_are_written(tmp_path, left
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("readings", [30, *nightly(150)])
+@pytest.mark.parametrize("readings", [20, *nightly(150)])
 def test_files_may_be_closed_by_any_thread_while_the_netcdf_library_reads(readings, tmp_path, left):
     program = compiled(cases.stack(), solver="daqp")
     sizes = DisplacementFields(program.nominal, "none").sizes
