@@ -9,7 +9,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import ALL_POINTS, call
+from tests.helpers import ALL_POINTS, call, compiled
 from tolcontact.errors import OptionError
 
 
@@ -68,7 +68,7 @@ def test_declared_things_print_as_rows():
 
 
 def test_programs_and_blocks_are_readable():
-    program = tc.build(cases.ra1(), solver="daqp")
+    program = compiled(cases.ra1(), solver="daqp")
     assert repr(program).splitlines()[0] == "program of RA1: daqp, exact, all points"
     assert "  contact interface: 202 contact points" in repr(program)
     (block,) = tc.simulate_blocks(program, samples=100, seed=1)
@@ -96,7 +96,7 @@ def test_a_model_is_resolved_by_its_own_method_unless_somebody_says_otherwise(tm
             assert tc.io.model_of(run).method == ALL_POINTS
     with tc.run(cases.stack(), samples=20, solver="daqp") as run:
         assert run.attrs["method_from"] == "defaults" and tc.io.model_of(run).method is None
-    (tmp_path / "tower.py").write_text((cases.MODELS / "tower.py").read_text())
+    (tmp_path / "tower.py").write_text("from models import tower\n\n\ndef assembly():\n    return tower.assembly(2)\n")
     assert "resolution: exact" in call(tmp_path, "run", "tower.py", "--samples", "20").stdout
     linear = call(tmp_path, "run", "tower.py", "--samples", "20", "--resolution", "linearized").stdout
     assert "resolution: linearized; objective: all points" in linear
