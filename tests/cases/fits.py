@@ -17,6 +17,7 @@ def shaft_in_a_bore(
     shaft: Any = None,
     bore: Any = None,
     clearance: float = CLEARANCE,
+    points: int | None = None,
 ) -> tc.Assembly:
     """A shaft of radius 10 that a force pulls aside in a bore, both 40 long; it does not turn about its axis."""
     a = tc.Assembly("fit")
@@ -25,7 +26,7 @@ def shaft_in_a_bore(
     pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(RADIUS, LENGTH, sections=96)), fixed=False)
     hole = ring.feature("bore", ring.face(tc.select.Cylinder(radius=inner)), *([bore] if bore else []))
     barrel = pin.feature("shaft", pin.face(BARREL), *([shaft] if shaft else []))
-    a.contact("fit", moving=barrel, reference=hole)
+    a.contact("fit", moving=barrel, reference=hole, points=points)
     stops = parked("X1:-10,0,18:x", "X2:-10,0,-18:x", "Y1:0,-10,18:y", "Y2:0,-10,-18:y")
     a.locate(pin, [tc.Locator("Z", (0, 0, -20), "z", 0), tc.Locator("T", (10, 0, 0), "y", 0), *stops])
     a.force("pull", at=pin.point(0, 0, 3), vector=(*PULL, 0))
