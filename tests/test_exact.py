@@ -6,8 +6,18 @@ import pytest
 import tolcontact as tc
 from tests import cases, referee
 from tests.helpers import (
-    EXACT, FIXED, PAPER, SEATED, SEATED_ON_POINTS, R_t, compiled, joined, moved_at_locators, nightly, simulate,
-)  # fmt: skip
+    EXACT,
+    FIXED,
+    PAPER,
+    SEATED,
+    SEATED_ON_POINTS,
+    R_t,
+    compiled,
+    joined,
+    moved_at_locators,
+    nightly,
+    simulate,
+)
 from tests.nonlinear import TrueProblem
 from tolcontact.simulation import simulate_block, simulate_blocks
 from tolcontact.variation import draw
