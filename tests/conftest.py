@@ -119,28 +119,6 @@ def forked_reader():
     shape_reader.close()
 
 
-@pytest.fixture(scope="session")
-def forked_workers():
-    """Shape files are read by forks of one process, where a test does not change the environment."""
-    from tests.forked_worker import ForkedWorkers  # noqa: PLC0415  (the hook must be there first)
-
-    workers = ForkedWorkers()
-    yield workers
-    workers.close()
-
-
-@pytest.fixture(scope="module", autouse=True)
-def forked_worker(request, forked_workers):
-    """The tests of the process that reads shape files start it as it is."""
-    from tests.forked_worker import forking  # noqa: PLC0415  (the hook must be there first)
-
-    popen = subprocess.Popen
-    if not request.module.__name__.endswith("shape_reader"):
-        subprocess.Popen = forking(popen, forked_workers)
-    yield
-    subprocess.Popen = popen
-
-
 @pytest.fixture(autouse=True)
 def shapes_are_checked(request):
     """Checking takes half as long again where there are many small calls: not in slow tests, nor in other modules."""
