@@ -91,6 +91,20 @@ def test_a_share_of_a_population_is_known_as_well_as_its_parts_are():
     assert 1.1 < sigma[2] / sigma[0] < 1.3
 
 
+@pytest.mark.parametrize("parts", [3, 10])
+def test_an_interval_of_a_mean_of_few_measured_rows_is_as_wide_as_students_and_a_spread_of_fewer_than_ten_has_none(parts):
+    values = np.random.default_rng(1).normal(0, SD, parts)
+    stack = tc.Stack("population")
+    stack.link("measured", 0, 0.1)
+    stack.gap("gap", limits=(None, 0.06))
+    stack.population({"measured": values})
+    mean, sigma, share, index = figures(stack)
+    half = stats.t(parts - 1).ppf(0.975) * values.std(ddof=1) / np.sqrt(parts)
+    assert mean[2] - mean[1] == pytest.approx(2 * half, rel=0.15)
+    assert share[2] == pytest.approx(exact_upper(0, parts), rel=0.02)
+    assert np.isfinite([sigma[1:], index[1:]]).all() == (parts == 10)
+
+
 def test_causes_are_no_parts():
     """What a shared cause adds to a contributor does not widen its own figures."""
     seat = tc.Assembly("seat")

@@ -1,4 +1,4 @@
-"""Do intervals cover if contributors are known from thirty parts? A linear stack, whose truth is known in closed form.
+"""Do intervals cover if contributors are known from few parts? A linear stack, whose truth is known in closed form.
 
 Each repetition draws the parts of each contributor, states their mean and standard deviation, or all of them as a population,
 simulates the stack, and asks whether the intervals contain the truth: those of the realizations alone, and those that include
@@ -20,7 +20,8 @@ FIGURES = "mean", "6 sigma", "outside limits", "Ppk as normal"
 NORMAL, SKEWED = stats.norm(), stats.gamma(4, -2, 0.5)
 ROWS = [  # contributors, parts of each, share outside, whether the parts are a population, distribution of parts
     (1, 30, 1e-3, False, NORMAL), (3, 30, 1e-3, False, NORMAL), (8, 30, 1e-3, False, NORMAL), (3, 10, 1e-3, False, NORMAL),
-    (1, 30, 2e-2, True, NORMAL), (3, 30, 1e-3, True, NORMAL), (3, 30, 1e-3, True, SKEWED),
+    (1, 4, 2e-2, True, NORMAL), (1, 10, 2e-2, True, NORMAL), (3, 10, 1e-3, True, NORMAL), (1, 30, 2e-2, True, NORMAL),
+    (3, 30, 1e-3, True, NORMAL), (3, 30, 1e-3, True, SKEWED),
 ]  # fmt: skip
 COEFFICIENTS = np.array([1.0, -0.5, 0.7, 1.0, -1.0, 0.3, 0.8, -0.6])
 MIXED = 2_000_000  # realizations that state the truth of a sum that has no closed form
@@ -55,7 +56,8 @@ def hits(row: tuple, repetitions: int, samples: int) -> tuple[np.ndarray, np.nda
         today = np.full((len(NAMES), 3), np.nan)
         values = intervals.mean(y), intervals.standard_deviation(y, times=6), intervals.proportion(y > upper)
         today[[NAMES.index(name) for name in FIGURES]] = *values, capability.as_normal(Sample.of(y), limits)[1]
-        estimates, _ = widened(Worlds(x, few, rows), y, limits, limits, today)
+        worlds = Worlds(x, few, rows)
+        estimates, _ = widened(worlds, worlds.index(y), y, limits, limits, today)
         chosen_rows = [NAMES.index(name) for name in FIGURES]
         for k, of in enumerate((today[chosen_rows], estimates[chosen_rows])):
             covered[k] += (of[:, 1] <= truths) & (truths <= of[:, 2])

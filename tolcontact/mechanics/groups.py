@@ -261,12 +261,12 @@ def _side(
     density   contact points of the group per area [1/mm^2] of the faces that count
     """
     counted, points = pair.counted(of_moving=of_moving), pair.P_m if of_moving else pair.P_r
-    weights, face_moments = pair.weights if method.is_exact else np.ones(len(points)), None
-    if method.counts_faces and _area(pair) > 0:
-        weights = weights * (_area(pair) * density / len(points))
-        region = pair.moving_region if of_moving else pair.reference_region
-        if region is not None and pair.samples_faces:
-            face_moments = moment_table(region.places, centre) @ region.shares * density
+    area, face_moments = _area(pair) if method.counts_faces else 0.0, None
+    if area > 0 and pair.samples_faces and (region := pair.moving_region if of_moving else pair.reference_region) is not None:
+        face_moments = moment_table(region.places, centre) @ region.shares * density
+    # Where a face counts, its points do not: their weights take long to compute.
+    weights = pair.weights if method.is_exact and face_moments is None else np.ones(len(points))
+    weights = weights * (area * density / len(points)) if area > 0 else weights
     all_moments = (moment_table(points, centre) * weights).sum(axis=1) if face_moments is None else face_moments.copy()
     all_moments[[4, 7, 9]] += all_moments[0] * radius**2
     return Side(position, part, of_moving, *counted, weights, centre, face_moments, density, all_moments)

@@ -17,7 +17,9 @@ no shape. Parts that were not measured are one more row of that distribution, ou
 and inside in lower ones: with one population this is the interval of Clopper and Pearson for that many parts. Where lots are
 drawn first, the weights of lots are drawn, too, and the parts not measured are lots.
 
-The spread over the worlds adds to the interval of the run like an independent error, on the log scale for spreads.
+The spread over the worlds adds to the interval of the run like an independent error, on the log scale for spreads. The mean of
+n rows varies over the worlds by s ((n - 1) / (n (n + 1)))^(1/2) only, and about normally: intervals are stretched so that it
+has Student's, t s / n^(1/2).
 """
 
 import math
@@ -45,6 +47,8 @@ MAX_FITTED = 20_000  # realizations that slopes are fitted to
 NEGLIGIBLE = 1e-6  # of the largest effect of a contributor
 FEW_BEYOND = 100  # realizations beyond a limit: with fewer, values are also moved
 POSITIVE = terms.STANDARD_DEVIATION, terms.SIX_SIGMA, terms.VARIANCE, terms.PP, terms.PP_NORMAL  # on the log scale
+LOCATIONS = terms.MEAN, terms.SHIFT
+MIN_ROWS = 10  # of a population: fewer know too little of its spread; 6 sigma would be covered in 60 % of cases with four
 NAMES = list(STATISTICS)
 BOUNDS = [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2]
 
@@ -107,10 +111,24 @@ class Worlds:
         """Whether values can be moved: contributors have a distribution, and not measured rows alone."""
         return bool(len(self._columns))
 
+    def fewest(self, index: "Index") -> float:
+        """Return the number of parts, or lots, in the smallest population that a measurement depends on; infinite for none."""
+        return min((rows.known for rows in compress(self._populations, index.depends)), default=math.inf)
+
     def unseen(self, index: "Index") -> np.ndarray:
         """Return the share (world,) of parts not measured, in the smallest population that a measurement depends on."""
-        fewest = min((rows.known for rows in compress(self._populations, index.depends)), default=math.inf)
-        return np.asarray(-np.expm1(np.log(self._unseen) / fewest))  # quantiles of a beta distribution
+        return np.asarray(-np.expm1(np.log(self._unseen) / self.fewest(index)))  # quantiles of a beta distribution
+
+    def stretch(self, index: "Index", name: str) -> float:
+        """Return how many times wider the interval of a statistic or change is than its spread over the worlds.
+
+        Without measured rows it is 1; of few rows a mean alone has an interval, and it is NaN for others.
+        """
+        if math.isinf(n := self.fewest(index)):
+            return 1.0
+        if n < MIN_ROWS and name not in LOCATIONS:
+            return math.nan
+        return float(scipy.stats.t.ppf(BOUNDS[1], n - 1) / scipy.stats.norm.ppf(BOUNDS[1]) * math.sqrt((n + 1) / (n - 1)))
 
     def index(self, y: np.ndarray) -> "Index":
         """Return the index of a measurement y (realization,) in all worlds; values that are NaN do not count."""
@@ -206,59 +224,63 @@ def with_few_parts(
     statistics, changes = statistics.copy(), changes.copy()
     exists = is_assembled(statuses(rows))
     for number, of_measure in enumerate(limits(rows)):
-        drawn = []
+        drawn, indices = list[np.ndarray](), list[Index]()
         for k, state in enumerate(terms.STATES):
             y = column(rows, terms.MEASURED, state=k, measure=number)
             y = np.where(np.isfinite(y) & (exists | (state == terms.STATES[terms.RAW])), y, np.nan)
             if np.isfinite(y).sum() >= MIN_VALUES:
                 kept = capability.without_stops(MeasuredValues(rows, number, state, of_measure).sample, of_measure)
-                statistics[number, k], draws = widened(worlds, y, of_measure, kept, statistics[number, k])
+                indices.append(worlds.index(y))
+                statistics[number, k], draws = widened(worlds, indices[-1], y, of_measure, kept, statistics[number, k])
                 drawn.append(draws)
         if len(drawn) == len(terms.STATES):
             raw, corrected = drawn
             ratio = corrected[:, NAMES.index(terms.SIX_SIGMA)] / raw[:, NAMES.index(terms.SIX_SIGMA)]
             of_change = {terms.SHIFT: corrected[:, 0] - raw[:, 0], terms.SPREAD_RATIO: ratio, terms.VARIANCE_RATIO: ratio**2}
             for estimate, name in zip(changes[number], terms.CHANGES, strict=True):
-                estimate[1:] = _joined(estimate, of_change[name], is_positive=name != terms.SHIFT)
+                stretch = max(worlds.stretch(index, name) for index in indices)
+                estimate[1:] = _joined(estimate, of_change[name], stretch, is_positive=name != terms.SHIFT)
     return statistics, changes
 
 
 def widened(
-    worlds: Worlds, y: np.ndarray, of_measure: Limits, kept: Limits, estimates: np.ndarray
+    worlds: Worlds, index: Index, y: np.ndarray, of_measure: Limits, kept: Limits, estimates: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return `STATISTICS` with wider intervals, and draws of them.
 
-    y           (realization,) values of a measure, NaN where there are none
+    index, y    of a measure: values (realization,), NaN where there are none
     of_measure  its limits; `kept` are those without stops
     estimates   (statistic, interval) from the realizations alone
     """
-    drawn, bounds = _draws(worlds, y, of_measure, kept)
+    drawn, bounds = _draws(worlds, index, y, of_measure, kept)
     estimates = estimates.copy()
     for name, estimate, draws in zip(NAMES, estimates, drawn.T, strict=True):
         if name in terms.SHARES:
             lower, upper = bounds[:, terms.SHARES.index(name)]
             estimate[1:] = np.minimum(estimate[1], lower), np.maximum(estimate[2], upper)
         else:
-            estimate[1:] = _joined(estimate, draws, is_positive=name in POSITIVE)
+            estimate[1:] = _joined(estimate, draws, worlds.stretch(index, name), is_positive=name in POSITIVE)
     return estimates, drawn
 
 
-def _joined(estimate: np.ndarray, drawn: np.ndarray, *, is_positive: bool) -> np.ndarray:
-    """Return the bounds of an estimate (value, lower, upper), with draws (world,) as an independent error on either side."""
+def _joined(estimate: np.ndarray, drawn: np.ndarray, stretch: float, *, is_positive: bool) -> np.ndarray:
+    """Return the bounds of an estimate (value, lower, upper), with draws (world,) as an independent error on either side.
+
+    stretch   by how much the draws spread too little about it
+    """
     drawn = drawn[np.isfinite(drawn)]
     if not (len(drawn) and np.isfinite(estimate).all()) or (is_positive and not (estimate[1] > 0 and drawn.min() > 0)):
         return estimate[1:]
     value, *bounds = np.log(estimate) if is_positive else estimate
     ends = np.quantile(np.log(drawn) if is_positive else drawn, BOUNDS)
-    lower = value - math.hypot(value - bounds[0], max(value - ends[0], 0.0))
-    upper = value + math.hypot(bounds[1] - value, max(ends[1] - value, 0.0))
+    lower = value - math.hypot(value - bounds[0], stretch * max(value - ends[0], 0.0))
+    upper = value + math.hypot(bounds[1] - value, stretch * max(ends[1] - value, 0.0))
     return np.exp([lower, upper]) if is_positive else np.array([lower, upper])
 
 
-def _draws(worlds: Worlds, y: np.ndarray, of_measure: Limits, kept: Limits) -> tuple[np.ndarray, np.ndarray]:
+def _draws(worlds: Worlds, index: Index, y: np.ndarray, of_measure: Limits, kept: Limits) -> tuple[np.ndarray, np.ndarray]:
     """Return statistics (world, statistic) of values y (realization,), NaN if they do not exist, and bounds (2, share)."""
     order = np.argsort(y)[: int(np.isfinite(y).sum())]  # NaN come last
-    index = worlds.index(y)
     parts = [(_weighted(y[order], w[:, order], of_measure, kept), 1 / (w**2).sum(axis=1)) for w in worlds.weights(index)]
     drawn, effective = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     first = NAMES.index(terms.BELOW)
