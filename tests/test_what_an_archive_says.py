@@ -129,6 +129,29 @@ def test_units_of_measures():
     assert tc.run(turned, samples=5)["measured"].attrs["units"] == "rad"
 
 
+def test_units_of_contributors_and_limits(tmp_path):
+    """Whoever reads the file alone gets deviations and limits in the units that stand beside them."""
+    a = tc.Stack("motor", units="in")
+    a.link("shaft", 1.5, 0.002)
+    a.gap("length", limits=(1.4, 1.6))
+    named = of_contributors, of_measures = (
+        ("deviation", "tolerance_range", "mean_shift"),
+        ("measured", "measure_nominal", "measure_tolerance", "measure_lower_limit", "measure_upper_limit", "measure_accuracy"),
+    )
+    tc.run(a, samples=5, out=tmp_path / "run.nc").close()
+    with xr.open_datatree(tmp_path / "run.nc") as tree:
+        for group, names in zip(("sample", ""), named, strict=True):
+            assert {tree[f"{group}/{name}"].attrs["units"] for name in names} == {"in"}
+    worst = tc.analyses.worst_case(a, samples=16)
+    assert "units" not in worst["measured"].attrs and worst["measure_units"].values.tolist() == ["in"]
+    a.variable("heat", 4, units="K", nominal=20)
+    mixed = tc.run(a, samples=5)
+    assert {mixed[f"sample/{name}"].attrs["units"] for name in of_contributors} == {"1"}
+    assert mixed["sample/contributor_units"].values.tolist() == ["in", "K"]
+    assert {mixed[name].attrs["units"] for name in of_measures} == {"in"}
+    assert tc.simulate(a, 5)["deviation"].attrs["units"] == "1"
+
+
 def test_the_sample_names_every_locator_with_its_tolerance_and_stiffness():
     tree = tc.run(cases.stopped(), samples=10, solver="daqp")
     sample = tree["sample"].to_dataset()

@@ -12,7 +12,7 @@ from tolcontact.archive.contact_values import Values, contact_values, face_numbe
 from tolcontact.archive.elastic_values import elastic_values
 from tolcontact.archive.rows import Row, kept_rows
 from tolcontact.archive.settings import Run
-from tolcontact.archive.variables import define, labels_of_rows, units_of_rows
+from tolcontact.archive.variables import define, labels_of_rows, units_of_model
 from tolcontact.compilation import Program
 from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart
@@ -50,8 +50,8 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     )
     # Where values follow each definition, the netCDF library writes all definitions every time, so that an archive of 300 parts
     # takes seven times as long. So all variables are defined first, while the groups are made.
-    entries = _entries(file, program, run, sums)
-    defined = [define(group, variable, values) for group, added in entries for variable, values in added.items()]
+    entries, units = _entries(file, program, run, sums), units_of_model(program)
+    defined = [define(group, variable, values, units=units) for group, added in entries for variable, values in added.items()]
     for stored, values in defined:
         if values.size:
             stored[...] = values
@@ -61,8 +61,7 @@ def _entries(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequence[i
     """Yield all groups with the values of their variables.
 
     The caller defines the variables of an entry before it asks for the next one. So their order in the file is the order of
-    these entries, and units that depend on the model are set between two entries: after the variables that have them are
-    defined. A group may occur in several entries.
+    these entries. A group may occur in several entries.
     """
     nominal, rows = program.nominal, kept_rows(program.nominal, run.keep)
     labels = labels_of_rows(nominal)
@@ -73,8 +72,6 @@ def _entries(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequence[i
     if nominal.scenes:
         yield from _stations(file, nominal, rows)
     yield file, {variable: None for variable in terms.ROWS if Row("", variable) in rows}
-    for variable, units in units_of_rows(program).items():
-        file[variable.name].units = units
     variations = locator_variations(program)[nominal.last_indices]
     yield file, {terms.SUMMED_ROWS: 0, terms.LOCATOR_VARIATION: variations, **_measure_values(program)}
     yield from _model(file.createGroup("model"), program)

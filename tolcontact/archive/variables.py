@@ -49,10 +49,12 @@ def small_caches() -> Iterator[None]:
         netCDF4.set_chunk_cache(*usual)
 
 
-def define(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any = None) -> tuple[netCDF4.Variable, np.ndarray]:
+def define(
+    group: netCDF4.Dataset, variable: ArchiveVariable, values: Any = None, *, units: Mapping[ArchiveVariable, str]
+) -> tuple[netCDF4.Variable, np.ndarray]:
     """Define a variable, and the dimensions of its values that the group does not have; return it, and the values as stored.
 
-    Checksums are compared on reading. A variable of realizations has no values yet.
+    Checksums are compared on reading. A variable of realizations has no values yet. `units` are those of `units_of_model`.
     """
     if variable.kind is str:
         # The netCDF library crashes if text of variable length is read through two open handles: it is stored as characters.
@@ -72,7 +74,7 @@ def define(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any = None
         fixed = [max(len(dimensions[dim]), 1) for dim in variable.dims[1:]]
         options["chunksizes"] = [_chunk_rows(np.dtype(variable.kind).itemsize * math.prod(fixed)), *fixed]
     created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
-    created.setncatts(_attributes(variable))
+    created.setncatts(_attributes(variable, units))
     return created, array
 
 
@@ -125,17 +127,20 @@ def sizes_of_rows(nominal: Nominal) -> dict[str, int]:
     }
 
 
-def units_of_rows(program: Program) -> dict[ArchiveVariable, str]:
-    """Return the units that depend on the model; the units of measures are "1" if they differ."""
-    units = {measure.units for measure in program.nominal.measures} or {"mm"}
-    return {
-        terms.REACTION: program.method.minimizes.reaction_units,
-        terms.MEASURED: units.pop() if len(units) == 1 else "1",
-    }
+def units_of_model(program: Program) -> dict[ArchiveVariable, str]:
+    """Return the units that depend on the model; those of measures, or of contributors, are "1" if they differ."""
+    units = {terms.REACTION: program.method.minimizes.reaction_units}
+    for variables, labelled_things in (
+        (terms.IN_MEASURE_UNITS, program.nominal.measures),
+        (terms.IN_CONTRIBUTOR_UNITS, program.draws.contributors),
+    ):
+        stated = {thing.units for thing in labelled_things} or {"mm"}
+        units |= dict.fromkeys(variables, stated.pop() if len(stated) == 1 else "1")
+    return units
 
 
-def _attributes(variable: ArchiveVariable) -> dict[str, Any]:
-    attributes = variable.all_attributes
+def _attributes(variable: ArchiveVariable, units: Mapping[ArchiveVariable, str]) -> dict[str, Any]:
+    attributes = variable.all_attributes | ({"units": units[variable]} if variable in units else {})
     if "flag_values" in attributes:
         attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)
     return attributes
@@ -146,12 +151,9 @@ def labelled(program: Program, values: Mapping[ArchiveVariable, Any], attributes
     texts = {**labels_of_rows(program.nominal), terms.CONTRIBUTOR: program.nominal.contributors}
     labels: dict[str, Any] = {name: np.array(list(names), dtype=object) for name, names in texts.items()}  # text of any length
     labels[terms.REALIZATION] = pd.RangeIndex(len(values[terms.STATUS]))
-    units = {variable: {"units": text} for variable, text in units_of_rows(program).items()}
+    units = units_of_model(program)
     return xr.Dataset(
-        {
-            variable.name: (variable.dims, array, _attributes(variable) | units.get(variable, {}))
-            for variable, array in values.items()
-        },
+        {variable.name: (variable.dims, array, _attributes(variable, units)) for variable, array in values.items()},
         {label.name: label.entry(labels[label.name]) for label in (*terms.COORDINATES, terms.CONTRIBUTOR_LABEL)},
         attributes,
     )

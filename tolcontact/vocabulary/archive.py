@@ -65,7 +65,7 @@ COORDINATES = (
 )
 
 MEASURED = variable(
-    "f8 measured(realization, state, measure) [mm]",
+    "f8 measured(realization, state, measure)",
     "value of a measure: displacement of a point, distance of two points, or the user's expression",
 )
 TRANSLATION = variable(
@@ -128,6 +128,7 @@ QUANTITY = variable(
     "gap, clearance or angle, or expression of the poses",
 )
 MEASURE_UNITS = variable("str measure_units(measure)", "units of the measure")
+IN_MEASURE_UNITS = MEASURED, MEASURE_NOMINAL, MEASURE_TOLERANCE, LOWER_LIMIT, UPPER_LIMIT, MEASURE_ACCURACY
 
 LINE_END = "line_end"
 MEASURE_OF_LINE = variable("i4 measure_of_line(measure_line)", "number of the measure that a line shows, counted from 0")

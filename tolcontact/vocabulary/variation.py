@@ -5,7 +5,7 @@ from tolcontact.vocabulary.labels import CONTRIBUTOR, FEATURE_FACE, FREEDOM, LOC
 FREEDOMS = ("tau x", "tau y", "tau z", "rho x", "rho y", "rho z")
 
 DEVIATION = variable(
-    "f8 deviation(realization, contributor) [mm]",
+    "f8 deviation(realization, contributor)",
     "deviation of a contributor: of a locator along its direction, of a freedom or the size of a feature, or of a variable; "
     "with what shared variables add to it",
 )
@@ -13,7 +13,7 @@ CONTRIBUTOR_LABEL = label(CONTRIBUTOR, "contributor, as part.locator, part.featu
 CONTRIBUTOR_SOURCE = variable("str source(contributor)", "what a contributor is of: locator, feature or variable")
 CONTRIBUTOR_UNITS = variable("str contributor_units(contributor)", "units of the deviation of a contributor")
 TOLERANCE_RANGE = variable(
-    "f8 tolerance_range(contributor) [mm]", "full width of the tolerance zone; NaN if the distribution alone defines the spread"
+    "f8 tolerance_range(contributor)", "full width of the tolerance zone; NaN if the distribution alone defines the spread"
 )
 DISTRIBUTION = variable(
     "str distribution(contributor)",
@@ -21,8 +21,9 @@ DISTRIBUTION = variable(
 )
 PARTS = variable("i8 parts(contributor) [1]", "number of parts that its distribution was estimated from; 0 if it is known")
 MEAN_SHIFT = variable(
-    "f8 mean_shift(contributor) [mm]", "mean of the contributor's own distribution, without what shared variables add to it"
+    "f8 mean_shift(contributor)", "mean of the contributor's own distribution, without what shared variables add to it"
 )
+IN_CONTRIBUTOR_UNITS = DEVIATION, TOLERANCE_RANGE, MEAN_SHIFT
 
 LOCATOR_LABEL = label(LOCATOR, "locator, as part.locator: contributors of the same number")
 STIFFNESS = variable("f8 stiffness(locator) [N mm-1]", "stiffness of the locator")
