@@ -216,6 +216,8 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
         "one,one\n1,2\n": 'columns 1 and 2 are both named "one"; rename one of them',
         "one [um]\n1\n": r'column "one \[um\]" is in um; give units="um"',
         "one (\N{MICRO SIGN}m)\n1\n": 'is in um; give units="um"',
+        "one [deg]\n1\n": r'column "one \[deg\]" is in deg; expected numbers in mm, as top.A1 is, and \[mm\] or nothing',
+        "one (furlong)\n1\n": "is in furlong; expected numbers in mm",
         "two\n1\n": "has no column 'one'; its columns are: two",
         "one\n1e16\n": 'line 2, column "one" is "1e16"; expected a number up to 1e\\+15',
         "one\n\u0661\n": 'line 2, column "one" is "\u0661"; expected a number',
@@ -227,6 +229,16 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
         (tmp_path / "p.csv").write_text(text, encoding="utf-8")
         with pytest.raises(ValueError, match=f'^population "p.csv".*{message}'):
             a.population(tmp_path / "p.csv", {"top.A1": "one"})
+    (tmp_path / "p.csv").write_text("shaft [in],heat [K]\n0.001,2\n-0.001,1\n", encoding="utf-8")
+    motor = tc.Stack("motor", units="in")
+    motor.link("shaft", 1.5, 0.002)
+    motor.variable("heat", 4, units="K", nominal=20)
+    assert motor.population(tmp_path / "p.csv").values.tolist() == [[0.001, 2], [-0.001, 1]]
+    with pytest.raises(ValueError, match=r'column "shaft \[in\]" is in in; give units="in"'):
+        motor.population(tmp_path / "p.csv", units="um")
+    in_mm = motor.population({"shaft": [0.0254, -0.0254], "heat": [2, 1]}, units="mm", gauge=0.0127)
+    assert in_mm.values == pytest.approx(np.array([[0.001, 2], [-0.001, 1]]))
+    assert in_mm.gauge == pytest.approx((0.0005, 0.0127))
     with pytest.raises(ValueError, match="a population is a int that is no table"):
         a.population(3)
     with pytest.raises(ValueError, match=r"has no column 'width'; its columns are: one, two"):

@@ -211,7 +211,7 @@ class Assembly(Declarations, Pictured, Checked):
         return self._add("correlations", Correlation(tuple(labels), rows, script_line(), kind))
 
     def population(
-        self, source: Any, columns: Mapping[str, str] | None = None, *, absolute: bool = False, units: Unit = "mm",
+        self, source: Any, columns: Mapping[str, str] | None = None, *, absolute: bool = False, units: Unit | None = None,
         gauge: float | Mapping[str, float] = 0.0, lots: str | None = None, gaps: Gaps = "refused",
     ) -> Population:  # fmt: skip
         """Declare that contributors are drawn from measured rows (see Population).
@@ -219,7 +219,7 @@ class Assembly(Declarations, Pictured, Checked):
         source    a CSV file, a DataFrame, a Dataset or a mapping of columns, with deviations from nominal values
         columns   label of the contributor of each column; by default the names of the columns are labels
         absolute  True: columns of sizes, of features declared before, hold sizes in place of deviations
-        units     of the numbers, by default mm: "um", "in", ...
+        units     of lengths: "um", "in", ...; by default, and of all else, the numbers are in the contributor's own units
         gauge     standard uncertainty of measurement in `units`, or one for each label: its variance is taken off the spread of
                   the parts; by default it stays in it
         lots      column with the lot of each row: realizations draw a lot, then a part of it; by default they draw any row
@@ -231,8 +231,9 @@ class Assembly(Declarations, Pictured, Checked):
         sizes = {f"{feature.label}.size": feature.size.nominal for feature in self.features if feature.size}
         expect("population: lots", lots, str | None, "the name of a column")
         table = population(
-            source, columns, script_line(), units=units, sizes=sizes if absolute else None, gauge=gauge, lots=lots, gaps=gaps
-        )
+            source, columns, script_line(), units=units, variables={cause.name: cause.units for cause in self.variables},
+            sizes=sizes if absolute else None, gauge=gauge, lots=lots, gaps=gaps,
+        )  # fmt: skip
         return self._add("populations", table)
 
     @overload

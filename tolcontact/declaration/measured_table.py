@@ -2,7 +2,7 @@
 
 import importlib  # pandas takes longer to import than all the rest: only if it is needed
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -15,6 +15,7 @@ from tolcontact.tables import number, read_table
 from tolcontact.texts import shown
 
 Gaps = Literal["refused", "left out"]  # rows with empty cells
+Expected = Callable[[str], str]  # the units of a contributor's column
 MAX_LISTED = 3  # cells in a message
 _HEADING = re.compile(r"(.*\S)\s*[\[(]\s*([^\])]*?)\s*[\])]")  # a name, and its unit in brackets
 _MICRO = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u"})
@@ -25,7 +26,7 @@ class Measured(NamedTuple):
 
     title   of the file or the kind of table
     labels  of the contributors, which are the columns
-    values  (row, column) in the units of the table; NaN for an entry that is no number
+    values  (row, column) in the units of the columns; NaN for an entry that is no number
     gaps    (row, column): whether an entry is empty
     lots    the lot of each row; empty without lots
     """
@@ -38,26 +39,36 @@ class Measured(NamedTuple):
 
 
 def population(
-    source: Any, columns: Mapping[str, str] | None, declared_at: str, *, units: str = "mm",
-    sizes: Mapping[str, float] | None = None, gauge: float | Mapping[str, float] = 0.0, lots: str | None = None,
-    gaps: Gaps = "refused",
+    source: Any, columns: Mapping[str, str] | None, declared_at: str, *, variables: Mapping[str, str],
+    units: str | None = None, sizes: Mapping[str, float] | None = None, gauge: float | Mapping[str, float] = 0.0,
+    lots: str | None = None, gaps: Gaps = "refused",
 ) -> Population:  # fmt: skip
     """Return the Population of a CSV file, a DataFrame, an xarray Dataset of one dimension, or a mapping of columns.
 
-    `sizes` are the nominal sizes [mm] by label, if columns of sizes hold absolute values; Assembly.population explains the
-    others. Entries of a table in memory that are not numbers become NaN, and a fault of the population. Raises ValueError for
-    an unreadable table, a cell of a file that is no number, or a missing column.
+    `variables` are the units of variables by name; other contributors are in mm. `sizes` are the nominal sizes [mm] by label,
+    if columns of sizes hold absolute values; Assembly.population explains the others. Entries of a table in memory that are
+    not numbers become NaN, and a fault of the population. Raises ValueError for an unreadable table, a cell of a file that is
+    no number, a missing column, or one in other units.
     """
-    for option, value, choices in (("units", units, tuple(UNITS)), ("gaps", gaps, get_args(Gaps))):
+    stated_units = "mm" if units is None else units
+    for option, value, choices in (("units", stated_units, tuple(UNITS)), ("gaps", gaps, get_args(Gaps))):
         if value not in choices:
             raise ValueError(f"population: {option} is {value!r}; expected one of: {', '.join(choices)}")
+
+    def own(label: str) -> str:
+        return variables.get(label, "mm")
+
+    def expected(label: str) -> str:
+        return own(label) if units is None or own(label) not in UNITS else units
+
     is_file = isinstance(source, str | Path)
-    measured = _of_file(source, columns, units, lots, gaps) if is_file else _of_memory(source, columns, units, lots)
+    measured = _of_file(source, columns, expected, lots, gaps) if is_file else _of_memory(source, columns, expected, lots)
     title, labels = measured.title, measured.labels
     kept = np.asarray(~measured.gaps.any(axis=1) | (gaps == "refused"))
     if not kept.any() and len(kept):
         raise ValueError(f'population "{title}": each of its {len(kept)} rows has a gap; leave out the column that is empty')
-    values, row_lots = UNITS[units] * measured.values[kept], np.array(measured.lots)[kept[: len(measured.lots)]]
+    factors = np.array([UNITS.get(expected(label), 1.0) / UNITS.get(own(label), 1.0) for label in labels])
+    values, row_lots = factors * measured.values[kept], np.array(measured.lots)[kept[: len(measured.lots)]]
     if sizes is not None:
         nominal = [sizes.get(label, 0.0) for label in labels]
         if not any(nominal):
@@ -72,12 +83,12 @@ def population(
     if wrong := [u for u in stated_gauge if not is_length(u)]:
         raise ValueError(f'population "{title}": gauge is {wrong[0]!r}; expected a standard uncertainty, or one for each label')
     uncertainties = [gauge.get(label, 0.0) for label in labels] if isinstance(gauge, Mapping) else [gauge] * len(labels)
-    stated = tuple(float(UNITS[units] * u) for u in uncertainties) if any(uncertainties) else ()
+    stated = tuple(float(f * u) for f, u in zip(factors, uncertainties, strict=True)) if any(uncertainties) else ()
     left_out = int((~kept).sum())
     return Population(tuple(labels), values, title, declared_at, stated, tuple(map(str, row_lots)), left_out)
 
 
-def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str, lots: str | None) -> Measured:
+def _of_memory(source: Any, columns: Mapping[str, str] | None, expected: Expected, lots: str | None) -> Measured:
     """Return a table in memory."""
     pd = importlib.import_module("pandas")
     try:
@@ -88,7 +99,7 @@ def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str, lots:
             "Dataset, or columns of equal length by name"
         ) from error
     title = f"of {len(table)} rows"
-    labels, indices, lot_index = _columns(title, list(map(str, table.columns)), columns, units, lots)
+    labels, indices, lot_index = _columns(title, list(map(str, table.columns)), columns, expected, lots)
     entries = [table.iloc[:, index].astype(object) for index in indices]
     is_gap = [
         (column.isna() | column.map(lambda cell: isinstance(cell, str) and not cell.strip())).to_numpy(dtype=bool)
@@ -103,14 +114,16 @@ def _of_memory(source: Any, columns: Mapping[str, str] | None, units: str, lots:
     return Measured(title, labels, values, gaps, _lots(title, cells, range(1, len(table) + 1), "row"))
 
 
-def _of_file(source: str | Path, columns: Mapping[str, str] | None, units: str, lots: str | None, gaps: Gaps) -> Measured:
+def _of_file(
+    source: str | Path, columns: Mapping[str, str] | None, expected: Expected, lots: str | None, gaps: Gaps
+) -> Measured:
     """Return the table of a CSV file."""
     title = shown(Path(source).name)
     try:
         table = read_table(Path(source), (columns or {}).values())
     except (OSError, ValueError) as error:
         raise ValueError(f'population "{title}" cannot be read as CSV: {error}') from error
-    labels, indices, lot_index = _columns(title, table.heading, columns, units, lots)
+    labels, indices, lot_index = _columns(title, table.heading, columns, expected, lots)
     # In a table of one column a blank line is a row without an entry.
     rows = [(line, cells or [""]) for line, cells in table.rows if cells or len(table.heading) == 1]
     faults, values = list[str](), np.full((len(rows), len(indices)), np.nan)
@@ -148,11 +161,11 @@ def _lots(title: str, cells: list[str], numbers: Sequence[int], kind: str) -> li
 
 
 def _columns(
-    title: str, heading: Sequence[str], columns: Mapping[str, str] | None, units: str, lots: str | None
+    title: str, heading: Sequence[str], columns: Mapping[str, str] | None, expected: Expected, lots: str | None
 ) -> tuple[list[str], list[int], int | None]:
     """Return labels and the indices of their columns, and the index of the column of lots, if there is one.
 
-    A heading may state its unit in brackets, which has to be `units`.
+    A heading may state its unit in brackets, which has to be the expected one.
     """
     stated = [match.groups() if (match := _HEADING.fullmatch(name)) else (name, "") for name in heading]
     labels = (
@@ -171,8 +184,14 @@ def _columns(
         if len(matching) > 1:
             places = " and ".join(str(k + 1) for k in matching)
             raise ValueError(f'population "{title}": columns {places} are both named "{name}"; rename one of them')
-        unit = stated[matching[0]][1].translate(_MICRO)
-        if unit in UNITS and unit != units:
-            raise ValueError(f'population "{title}": column "{heading[matching[0]]}" is in {unit}; give units="{unit}"')
         indices.append(matching[0])
+    for label, index in zip(labels, indices, strict=False):  # lots have no units
+        unit, needed = stated[index][1].translate(_MICRO), expected(label)
+        if unit and unit != needed and heading[index] != label:
+            remedy = (
+                f'give units="{unit}"' if {unit, needed} <= UNITS.keys()
+                else f"expected numbers in {needed}, as {label} is, and [{needed}] or nothing in brackets; convert the column, "
+                "or rename it"
+            )  # fmt: skip
+            raise ValueError(f'population "{title}": column "{shown(heading[index])}" is in {shown(unit)}; {remedy}')
     return labels, indices[: len(names)], None if lots is None else indices[-1]
