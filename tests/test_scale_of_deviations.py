@@ -242,6 +242,31 @@ def test_a_population_of_a_variable_in_micrometres_is_noticed(factor, count):
     assert [("to block.A1, which does not fit" in str(one.message)) for one in caught] == [True] * count
 
 
+@pytest.mark.parametrize("units", ["mm", "in"])
+@pytest.mark.parametrize("zone", [0.1, 0.0, 3.0])
+def test_a_population_of_absolute_lengths_of_a_link_is_noticed(units, zone):
+    def said(values):
+        stack = tc.Stack("stack", units=units)
+        stack.link("disc", 6.6, zone)
+        stack.gap("gap")
+        stack.population({"disc": values})
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            assert not tc.check(stack)
+        return [str(one.message) for one in caught if "[units]" in str(one.message)]
+
+    assert not said([0.01, -0.01, 0.02])
+    if zone > 1:  # as wide as a coarse casting: nothing is certain
+        assert not said([6.61, 6.59, 6.6])
+        return
+    (text,) = said([6.61, 6.59, 6.6])
+    assert re.search(
+        rf'^\[units\] population "of 3 rows" .*: disc is around 6.6 {units}, near its nominal value, and deviations from it '
+        r'are expected; subtract it, as in population\(\{"disc": values - 6.6\}\)$',
+        text,
+    )
+
+
 def test_a_capability_in_per_cent_is_noticed():
     a = tc.Assembly("block")
     block = Part(a, a.part("block", tc.Box(50, 30, 20)), 50.0, 0.2, np.random.default_rng(0))

@@ -11,6 +11,7 @@ from tolcontact.declaration.scale import (
     COARSEST,
     CONSTANT_SHARE,
     FINEST,
+    MAX_ZONES,
     Scale,
     doubt_of_distribution,
     doubt_of_rows,
@@ -26,7 +27,7 @@ MAX_CP = 10.0
 
 
 def out_of_scale(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each population, distribution and variable that does not fit what it deviates."""
+    """Yield a sentence for each population, distribution and variable that does not fit what it deviates, or its dimension."""
     program = draws.program
     freedoms = {freedom.label: freedom for freedom in program.draws.contributors}
     stated = scales(program.nominal)
@@ -34,12 +35,13 @@ def out_of_scale(draws: TrialDraws) -> Iterator[str]:
         label: scale if scale.width else replace(scale, width=SIX_SIGMA * math.sqrt(freedoms[label].variance))
         for label, scale in stated.items()
     }
-    measured = dict[str, np.ndarray]()
+    measured, variables = dict[str, np.ndarray](), {cause.name: cause for cause in program.nominal.assembly.variables}
     for population in program.nominal.assembly.populations:
         columns = dict(zip(population.columns, population.values.T, strict=True))
         measured |= columns
         for label, values in columns.items():
-            if label in by_label and (doubt := doubt_of_rows(by_label[label], label, values)):
+            doubt = doubt_of_rows(by_label[label], label, values) if label in by_label else ""
+            if doubt := doubt or (_doubt_of_dimension(variables[label], values) if label in variables else ""):
                 yield f"{population.designation}: {doubt}"
                 break
     reported = set[tuple[str, str]]()
@@ -49,12 +51,27 @@ def out_of_scale(draws: TrialDraws) -> Iterator[str]:
         if doubt and key not in reported:  # once for the locators of a part
             reported.add(key)
             yield f'{freedom.source} "{label}": {doubt}'
-    for variable in program.nominal.assembly.variables:
+    for variable in variables.values():
         centre, width = centre_and_width(freedoms[variable.name])
         if variable.name in measured:
             values = measured[variable.name]
             centre, width = float(values.mean()), SIX_SIGMA * float(values.std())
         yield from _doubts_of_variable(variable, centre, width, by_label)
+
+
+def _doubt_of_dimension(dimension: Variable, values: np.ndarray) -> str:
+    """Return what to do about measured rows (row,) of a dimension that are absolute; empty if they may be deviations.
+
+    Absolute values are far beyond its zone, and much nearer to its nominal value.
+    """
+    zone = max(SIX_SIGMA * float(values.std()), dimension.limits.width if dimension.limits else 0.0)
+    centre, nominal = float(values.mean()), dimension.nominal or 0.0
+    if abs(centre) <= MAX_ZONES * zone or abs(centre - nominal) >= abs(centre) / 2:
+        return ""
+    return (
+        f"{dimension.name} is around {centre:.6g} {dimension.units}, near its nominal value, and deviations from it are "
+        f'expected; subtract it, as in population({{"{dimension.name}": values - {nominal:g}}})'
+    )
 
 
 def _doubt(freedom: Freedom, scale: Scale | None) -> str:
