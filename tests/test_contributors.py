@@ -200,6 +200,20 @@ def test_wrong_causes_have_one_message(declare, said):
     assert said in fault and ("test_contributors.py" in fault or "declared 2 times" in fault)
 
 
+def test_unknown_owners_of_contributors_are_named_beside_other_faults():
+    a = cases.ra1()
+    a.measure("reversed", a.parts[0].point(0, 0, 0), along="z", limits=(1, 0))
+    a.variable("heat", 1, drives={"tpo.A1": 1, "top.not made yet": 1, 3: 1})
+    a.correlate(["top.A1", "tpo.A1"], 0.5)
+    a.population({"top.A1": [0.1, 0.2], "top.A9": [0.1, 0.2]})
+    a.part("empty", tc.Box(1, 1, -1), fixed=True)
+    unknown = [fault for fault in tc.check(a) if "unknown contributor" in fault]
+    assert len(unknown) == 2 and all(
+        'unknown contributor "tpo.A1"; contributors are, for example: top.' in one for one in unknown
+    )
+    assert not any("is drawn by" in fault for fault in tc.check(a))
+
+
 def test_tables_that_cannot_be_read_are_named(tmp_path):
     a = cases.ra1()
     with pytest.raises(ValueError, match=r'population "none.csv" cannot be read as CSV'):

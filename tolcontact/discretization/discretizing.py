@@ -70,14 +70,14 @@ def discretize(assembly: Assembly, *, incomplete: bool = False, presses: bool | 
         for pair in scene.assembly.pairs
         if not any(pair.faults()) and all(part in placed for part in (*pair.moving.parts, *pair.reference.parts))
     ]
+    labels = [label for nominal in nominal_parts for label in nominal.locators.labels]
+    labels += [*(freedom.label for freedom in features.freedoms), *(variable.name for variable in assembly.variables)]
     if is_sound:
         faults.extend(fault for scene in scenes for fault in _immovable_pairs(scene))
-        labels = [label for nominal in nominal_parts for label in nominal.locators.labels]
-        labels += [*(freedom.label for freedom in features.freedoms), *(variable.name for variable in assembly.variables)]
         faults.extend(_repeated_labels(labels))
-        if not faults:
-            shifts = {freedom.label for freedom in features.freedoms if freedom.source == DATUM}
-            faults.extend(_contributor_faults(assembly, labels, shifts))
+    shifts = {freedom.label for freedom in features.freedoms if freedom.source == DATUM}
+    unsure = tuple(owner.name for owner in (*assembly.parts, *assembly.joints)) if faults else ()
+    faults.extend([*_contributor_faults(assembly, labels, shifts, unsure), *(() if faults else _effect_faults(assembly))])
     faults.extend(fault for scene in scenes for fault in _reserved_names(scene))
     Faults(dict.fromkeys(faults)).refuse(assembly.name)
     pairs += support_pairs(nominal_parts, scenes)
@@ -180,19 +180,25 @@ def _repeated_labels(labels: Sequence[str]) -> Iterator[str]:
             )
 
 
-def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[str]) -> Iterator[str]:
-    """Yield references to unknown contributors, or to `shifts` that follow from others, and contributors drawn twice."""
+def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[str], unsure: Sequence[str]) -> Iterator[str]:
+    """Yield references to unknown contributors, or to `shifts` that follow from others, and contributors drawn twice.
+
+    Beside other faults `labels` are not all: what may be a contributor of the `unsure` parts and joints is left out, and so are
+    the faults of known contributors.
+    """
     recognized, variables = set(labels), {variable.name for variable in assembly.variables}
-    sources: dict[str, str] = {}
+    sources, of_unsure = dict[str, str](), tuple(f"{name}." for name in unsure)
     for kind, place, references in (
         *(("variable", designation("variable", cause), tuple(cause.drives)) for cause in assembly.variables),
         *(("correlation", designation("correlation", copula), copula.labels) for copula in assembly.correlations),
         *(("population", designation("population", table), table.columns) for table in assembly.populations),
     ):
         for label in references:
+            if unsure and (label in recognized or not isinstance(label, str) or label.startswith(of_unsure)):
+                continue
             if label not in recognized:
                 similar = difflib.get_close_matches(label, labels, 3, 0.3) or list(labels[:3])
-                yield f'{place}: unknown contributor "{label}"; contributors are, for example: {", ".join(similar)}'
+                yield f'{place}: unknown contributor "{label}"; contributors are, for example: {", ".join(similar) or "none"}'
             elif label in shifts:
                 yield f'{place}: "{label}" follows from the tilts of its datum, or from its form; leave it out, and state those'
             elif kind == "variable" and label in variables:
@@ -201,6 +207,10 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[s
                 yield f'{place}: contributor "{label}" is drawn by {sources[label]} already; leave it out of one of them'
             elif kind != "variable":
                 sources[label] = place
+
+
+def _effect_faults(assembly: Assembly) -> Iterator[str]:
+    """Yield what variables expand or load that is unknown, or elastic."""
     for cause in assembly.variables:
         parts = {part.name: part for part in assembly.parts}
         forces = {force.name: force.at.part for force in assembly.forces}
