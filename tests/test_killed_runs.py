@@ -43,6 +43,10 @@ def test_a_killed_run_keeps_its_rows_and_goes_on(samples, after, keep, program, 
     row_bytes = bytes_of_rows(program.nominal, keep, 1) - 8  # without the number of the realization
     written = path.with_name(".killed.nc.rows").stat().st_size / row_bytes
     assert after <= written < samples
+    with pytest.raises(
+        ArchiveError, match=r"^0 realizations are in the archive.* journal of a run that was killed are not counted"
+    ):
+        tc.summarize(path)
     tc.run(program, samples=samples, seed=3, out=path, keep=keep, resume=True).close()
     with xr.open_dataset(path) as resumed:
         at = int(re.search(r"resumed after (\d+) realizations", resumed.attrs["history"]).group(1))

@@ -84,7 +84,10 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
     """Return the dataset of `summarize`."""
     count = finished(results)
     if count < MIN_REALIZATIONS:
-        raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
+        raise ArchiveError(
+            f"{count} realizations are in the archive, too few for statistics; those in the journal of a run that was killed "
+            "are not counted: continue with --resume, which keeps them"
+        )
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
     combinations, smallest = contact.combinations(rows), _smallest_range(results, rows)
     statistics, changes, notes = measure_estimates(rows)
