@@ -1,10 +1,16 @@
 """Intervals that include what few measured parts leave open, against closed forms and nested simulation."""
 
+import io
+import re
+
 import numpy as np
 import pytest
+from rich.console import Console
 from scipy import optimize, stats
 
 import tolcontact as tc
+from tolcontact.report.results_table import result_rows
+from tolcontact.report.summary_text import summary_text
 
 PARTS, MEAN, SD = 30, 0.01, 0.02
 OTHERS = {"Z2": (0, 0, 0), "Z3": (20, 0, 0), "Y1": (0, 0, 5), "Y2": (20, 0, 5), "X1": (0, 10, 5)}
@@ -103,6 +109,27 @@ def test_an_interval_of_a_mean_of_few_measured_rows_is_as_wide_as_students_and_a
     assert mean[2] - mean[1] == pytest.approx(2 * half, rel=0.15)
     assert share[2] == pytest.approx(exact_upper(0, parts), rel=0.02)
     assert np.isfinite([sigma[1:], index[1:]]).all() == (parts == 10)
+
+
+def test_what_few_parts_leave_open_needs_parts_and_no_realizations():
+    """Three parts leave a share of up to 70 % possible, whatever the number of realizations."""
+
+    def text(parts):
+        stack = tc.Stack("measured")
+        stack.link("a", 10, 0.3)
+        stack.gap("gap", limits=(9.5, 10.5))
+        if parts:
+            stack.population({"a": np.linspace(-0.01, 0.01, parts)})
+        summary = tc.summarize(tc.run(stack, samples=200, seed=1))
+        console = Console(width=200, record=True, file=io.StringIO())
+        console.print(summary_text(summary))
+        assert (f"measurements include: population 1: a from {parts} parts" in console.export_text()) == bool(parts)
+        (row,) = result_rows(summary)
+        return row.verdict
+
+    assert text(3) == "undecided: it is known from few parts, so measure more parts; more realizations decide nothing"
+    assert re.fullmatch(r"undecided: about [\d ]+ more realizations", text(0))
+    assert re.fullmatch(r"undecided: about [\d ]+ more realizations", text(5000))
 
 
 def test_causes_are_no_parts():

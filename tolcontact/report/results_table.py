@@ -107,7 +107,8 @@ def verdict_of(measure: xr.Dataset, realizations: int) -> Verdict | None:
     statistics = measure["statistic_value"]
     spreads = statistics.sel(statistic=terms.STANDARD_DEVIATION, interval="estimate").values  # raw and corrected
     varies = bool((spreads > float(measure[terms.MEASURE_LIMITS[2]].values)).any())
-    return verdict(statistics.sel(state=terms.STATES[1], statistic=terms.OUTSIDE).values, realizations, varies=varies)
+    share, open_by_parts = statistics.sel(state=terms.STATES[1], statistic=terms.OUTSIDE), bool(measure[terms.OPEN_BY_PARTS])
+    return verdict(share.values, realizations, varies=varies, open_by_parts=open_by_parts)
 
 
 def verdict_text(opinion: Verdict | None) -> str:
@@ -116,6 +117,8 @@ def verdict_text(opinion: Verdict | None) -> str:
         return ""
     if opinion.word != UNDECIDED:
         return opinion.word
+    if math.isinf(opinion.more):
+        return f"{UNDECIDED}: it is known from few parts, so measure more parts; more realizations decide nothing"
     digits = DIGITS_OF_COUNTS - len(str(int(opinion.more)))
     return f"{UNDECIDED}: about {grouped(int(round(opinion.more, min(digits, 0))))} more realizations"
 

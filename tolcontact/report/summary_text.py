@@ -63,6 +63,7 @@ def _sections(summary: xr.Dataset, *, is_whole: bool) -> Iterator[Text | Table |
     elif remark or not is_long:
         yield Text(remark or f"percentiles and capability of each: {EVERYTHING}")
     if not summary.sizes["part"]:
+        yield from map(Text, summary.attrs["correlations"].splitlines())
         return
     if not is_long:
         magnitudes = int(summary["magnitude_realizations"])

@@ -211,23 +211,26 @@ class Verdict(NamedTuple):
     """The verdict on a measurement.
 
     word   one of MEETS, FAILS, UNDECIDED, CONSTANT
-    more   number of additional realizations that would probably decide; 0 if it is decided
+    more   number of additional realizations that would probably decide; 0 if it is decided, infinite if only parts would
     """
 
     word: str
     more: float = 0.0
 
 
-def verdict(share: np.ndarray, realizations: int, *, varies: bool = True) -> Verdict | None:
+def verdict(share: np.ndarray, realizations: int, *, varies: bool = True, open_by_parts: bool = False) -> Verdict | None:
     """Return the verdict on a share (estimate, lower, upper) out of specification; None for a share that is not a number.
 
-    A measure that does not vary needs no further realizations: it is CONSTANT if none is out of specification.
+    A measure that does not vary needs no further realizations: it is CONSTANT if none is out of specification. None decide a
+    share that few measured parts leave open.
     """
     estimate, lower, upper = (float(value) for value in share)
     if not all(map(math.isfinite, (estimate, lower, upper))):
         return None
     word = _word(lower, upper) if varies or estimate > 0 else CONSTANT
-    return Verdict(word, _more(estimate, realizations) if word == UNDECIDED else 0.0)
+    if word != UNDECIDED:
+        return Verdict(word)
+    return Verdict(word, math.inf if open_by_parts else _more(estimate, realizations))
 
 
 def _word(lower: float, upper: float) -> str:

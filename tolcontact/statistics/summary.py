@@ -91,8 +91,10 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
     combinations, smallest = contact.combinations(rows), _smallest_range(results, rows)
     statistics, changes, notes = measure_estimates(rows)
+    by_realizations = statistics
     if worlds := worlds_of(results, count):
         statistics, changes = with_few_parts(rows, worlds, statistics, changes)
+    notes[terms.OPEN_BY_PARTS] = _are_open_by_parts(by_realizations, statistics)
     rigid, (clashes, clash_names) = _is_rigid(results), contact.clashes(rows)
     values = {
         terms.STATISTIC_VALUE: statistics,
@@ -145,6 +147,15 @@ def in_conflict(rows: xr.Dataset, rigid: np.ndarray) -> np.ndarray:
     gap = rows[terms.GAP_MIN.name].sel({terms.STATE: "corrected"}).transpose(terms.REALIZATION, terms.PAIR).values
     stuck = rows[terms.STATUS.name].values == terms.Status.NOT_ASSEMBLABLE
     return stuck[:, None] & (gap < -rows.attrs["solver_accuracy"]) & rigid
+
+
+def _are_open_by_parts(by_realizations: np.ndarray, statistics: np.ndarray) -> np.ndarray:
+    """Return whether few parts make the interval of a share outside limits (measure,) more than twice as wide."""
+    before, after = (
+        np.ptp(values[:, terms.CORRECTED, list(STATISTICS).index(terms.OUTSIDE), 1:], axis=1)
+        for values in (by_realizations, statistics)
+    )
+    return (after > 2 * before).astype(np.int64)
 
 
 def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
