@@ -7,6 +7,7 @@ import re
 import numpy as np
 import openpyxl
 import pytest
+import xarray as xr
 from rich.console import Console
 from scipy import stats
 
@@ -174,6 +175,21 @@ def test_the_page_has_the_loop_the_figures_and_the_dimensions(tmp_path):
         assert str(tc.io.model_of(results)) == str(tc.build(tmp_path / "play.py").nominal.assembly)
     tc.io.write_model(tmp_path / "play.py", tmp_path / "play.json")
     assert str(tc.build(tmp_path / "play.json").nominal.assembly) == str(tc.build(tmp_path / "play.py").nominal.assembly)
+
+
+def test_a_resumed_stack_has_the_stack_up_of_all_its_realizations(tmp_path):
+    tc.io.write_model(brackets(), tmp_path / "m.json")
+    run = ("run", "m.json", "--out", "m.nc", "--quiet", "--report", "m.html", "--resume", "--samples")
+    for samples in (10, 30, 30):
+        done = call(tmp_path, *run, samples)
+        assert done.returncode == 0 and f"measurements of brackets: {samples} realizations" in done.stdout, done.stderr
+        stored = xr.load_dataset(tmp_path / "m.nc", group="statistics/stack_up")
+        xr.testing.assert_identical(stored, tc.analyses.stack_up(tmp_path / "m.nc", samples=samples))
+        assert f"<p>{samples} realizations. worst case, RSS" in (tmp_path / "m.html").read_text(encoding="utf-8")
+    added = call(tmp_path, "stackup", "m.nc", "--into", "m.nc", "--samples", 40)
+    assert added.returncode == 0 and call(tmp_path, *run, 35).stdout.count("of brackets: 40 realizations") == 1
+    refused = call(tmp_path, "stackup", "m.nc", "--into", "m.nc", "--samples", 40)
+    assert refused.returncode == 2 and "choose another archive, or more samples than its 40" in refused.stderr
 
 
 def test_a_stack_has_all_analyses():

@@ -125,7 +125,7 @@ class Analysis:
         self.samples, self.seed, self.progress, self._minutes = samples or 0, seed, progress, minutes
         self._blocks, self._client = mapping(client), client
         if into is not None:
-            check_room_for(into, record, self.program)
+            check_room_for(into, record, self.program, self.samples)
         self._begin()
 
     def _begin(self) -> None:

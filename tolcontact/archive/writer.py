@@ -222,16 +222,25 @@ def _as_archive_error(path: Path) -> Iterator[None]:
         raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
 
 
-def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Program) -> None:
-    """Raise ArchiveError unless an archive is of the program's model and holds no complete answer of this analysis yet."""
+def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Program, realizations: int) -> None:
+    """Raise ArchiveError unless an archive is of the program's model and takes an answer of so many realizations.
+
+    It takes none if it holds a complete one of this analysis, unless that one grows and is of fewer realizations.
+    """
     archive = Path(os.path.realpath(path))
     check_archive(archive)
     with open_netcdf(archive, "r") as file:
         check_same_model(file, archive, program)
         stored = _stored_analysis(file, record)
-        if stored is not None and terms.COARSE not in stored.ncattrs():
-            group = f"{terms.ANALYSES_GROUP}/{record.name}"
-            raise ArchiveError(f'"{path}" already has {group}, which is not replaced; choose another archive')
+        if stored is None or terms.COARSE in stored.ncattrs():
+            return
+        count, remedy = getattr(stored, "realizations", None), ""
+        if record.grows and isinstance(count, np.integer):
+            if count < realizations:
+                return
+            remedy = f", or more samples than its {count}"
+        group = f"{terms.ANALYSES_GROUP}/{record.name}"
+        raise ArchiveError(f'"{path}" already has {group}, which is not replaced; choose another archive{remedy}')
 
 
 def _stored_analysis(file: netCDF4.Dataset, record: terms.AnalysisRecord) -> netCDF4.Group | None:
@@ -245,15 +254,16 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", 
     The file is replaced only when all of the new one is written.
     """
     with locked_archive(path, resume=True) as archive:
-        check_room_for(archive, record, program)
+        check_room_for(archive, record, program, int(dataset.attrs.get("realizations", 0)))
         with replacing_archive(archive) as part:
             shutil.copyfile(archive, part)
             stored = dataset.copy()
             for array in stored.variables.values():
                 array.encoding = {"fletcher32": True} | ({"dtype": "S1"} if array.dtype.kind in "UO" else {})
             with open_netcdf(part, "r+") as file:
-                if (coarse := _stored_analysis(file, record)) is not None:  # a complete answer replaces it
-                    coarse.delncattr(terms.COARSE)
+                replaced = _stored_analysis(file, record)
+                if replaced is not None and terms.COARSE in replaced.ncattrs():  # a complete answer replaces it
+                    replaced.delncattr(terms.COARSE)
             group = f"{terms.ANALYSES_GROUP}/{record.name}"
             try:
                 stored.to_netcdf(files.plain_path(part), mode="a", group=group, engine="netcdf4")

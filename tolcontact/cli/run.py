@@ -15,6 +15,7 @@ from tolcontact.cli import app as common, output
 from tolcontact.cli.output import print_summary
 from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.errors import OptionError
+from tolcontact.realizations import archived_analysis
 from tolcontact.simulation.cluster import client_of
 from tolcontact.statistics import Summary
 from tolcontact.temporary import temporary_folder
@@ -110,11 +111,14 @@ def _checked_page(model: Path, out: Path | None, report: Path | None, *, overwri
 
 
 def _stack_up(path: Path) -> Dataset | None:
-    """Return the stack-up of the archive of a model without parts, which is added to it; None for an assembly."""
+    """Return the stack-up of the archive of a model without parts, which holds it from then on; None for an assembly."""
     with open_unchecked(path) as results:
         if results.sizes["part"]:
             return None
         samples, seed = min(int(results.attrs["realizations"]), MAX_STACK), int(results.attrs["seed"])
+        stored = archived_analysis(results, STACK_UP)
+    if stored is not None and stored.attrs.get("realizations", 0) >= samples:
+        return stored
     return tolcontact.analyses.stack_up(path, samples=samples, seed=seed, into=path)
 
 

@@ -41,13 +41,15 @@ FIXED_LABELS = {
 class AnalysisRecord:
     """The form of an analysis, as it is returned and archived; `title` is a format of the assembly's name and of attributes.
 
-    Only assemblies that are built in stations have variables `of_stations`.
+    Only assemblies that are built in stations have variables `of_stations`. In an archive an answer that `grows` is replaced by
+    one of more realizations; other complete answers stay.
     """
 
     name: str
     title: str
     variables: tuple[ArchiveVariable, ...]
     of_stations: tuple[ArchiveVariable, ...] = ()
+    grows: bool = False
 
     @property
     def known(self) -> dict[str, ArchiveVariable]:
@@ -148,7 +150,7 @@ STACK_UP = AnalysisRecord("stack_up", "stack-up of the measurements of {assembly
     variable("i8 links(measure) [1]", "number of contributors that have an effect"),
     variable("i8 forms(measure) [1]", "number of forms of faces among them"),
     _by_status(),
-))  # fmt: skip
+), grows=True)  # fmt: skip
 SWEEP = AnalysisRecord("sweep", "envelope of the measurements of {assembly}", (
     variable(
         "f8 envelope(measure, state, end, of_envelope, interval)",
