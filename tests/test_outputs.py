@@ -22,12 +22,13 @@ def assembly():
 @pytest.mark.parametrize("outputs, words", [
     (["--out", "a.html", "--report", "a.html"], '"a.html" would be the archive and the page'),
     (["--out", "m.py", "--overwrite"], '"m.py" would be the input and the archive'),
-    (["--out", "other.py", "--overwrite"], '"other.py" is no netCDF file, and only these are replaced'),
+    (["--out", "other.py", "--overwrite"], '"other.py" is not the name of an archive; expected one that ends in .nc'),
+    (["--out", "other.nc", "--overwrite"], '"other.nc" is no netCDF file, and only these are replaced'),
     (["--out", "A.html", "--report", "./sub/../a.html"], "would be the archive and the page"),
-], ids=["page", "model", "other", "case"])  # fmt: skip
+], ids=["page", "model", "ending", "other", "case"])  # fmt: skip
 def test_no_output_replaces_an_input_or_another_output(outputs, words, tmp_path):
     (tmp_path / "sub").mkdir()
-    for name in ("m.py", "other.py"):
+    for name in ("m.py", "other.py", "other.nc"):
         (tmp_path / name).write_text(MODEL)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     done = call(tmp_path, "run", "m.py", "--samples", "10", *outputs)
@@ -70,6 +71,17 @@ def test_a_comparison_replaces_none_of_the_runs_that_it_compares(tmp_path):
     done = call(tmp_path, "compare", "a.nc", "b.nc", "--out", "link.nc", "--overwrite")
     assert done.returncode == 2 and '"link.nc" would be the input and the archive' in done.stderr
     assert (tmp_path / "a.nc").read_bytes() == before
+
+
+def test_an_archive_has_the_ending_by_which_commands_know_it(tmp_path):
+    """Without the ending an archive would be taken for a script by the commands that read both."""
+    with pytest.raises(tc.errors.ArchiveError, match=r'a.html" is not the name of an archive; expected one that ends in .nc'):
+        tc.run(cases.stack(), samples=20, out=tmp_path / "a.html")
+    tc.run(cases.stack(), samples=20, surfaces=0, fields="none", out=tmp_path / "a.nc").close()
+    (tmp_path / "a.archive").hardlink_to(tmp_path / "a.nc")
+    refused = call(tmp_path, "seating", "a.nc", "--into", "a.archive")
+    assert refused.returncode == 2 and '"a.archive" is not the name of an archive' in refused.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.archive", "a.nc"]
 
 
 def test_the_folder_of_a_killed_run_is_removed_and_that_of_a_run_in_progress_stays(tmp_path, monkeypatch):

@@ -20,6 +20,11 @@ def fault_of(path: Path, max_bytes: int = sys.maxsize) -> str:
     return f"has {size} bytes; expected at most {max_bytes}" if size > max_bytes else ""
 
 
+def is_archive(path: str | Path) -> bool:
+    """Return whether a path has the extension of an archive."""
+    return Path(path).suffix.lower() == ".nc"
+
+
 def check_inputs(paths: Iterable[Path], max_bytes: int = MAX_BYTES) -> None:
     """Raise ValueError unless all paths are regular files, of at most `max_bytes` together."""
     total = 0

@@ -15,13 +15,14 @@ from tolcontact.analyses.analysis import Analysis, Progress
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model, parameter_fault
 from tolcontact.errors import OptionError
+from tolcontact.input_files import is_archive
 from tolcontact.limits import Limits
 from tolcontact.method import Solver
 from tolcontact.statistics import intervals
 from tolcontact.statistics.capability import PERCENTS
 from tolcontact.statistics.measure_statistics import MIN_VALUES
 from tolcontact.statistics.sample import Sample
-from tolcontact.workflow.models import Choice, is_archive
+from tolcontact.workflow.models import Choice
 
 OF_ALL_POSITIONS = "[limits]", "[effect]"  # kinds of doubts that a single position does not justify
 Mechanism = Callable[..., Assembly] | str | Path  # a function of parameters that returns an assembly, or a script with one

@@ -19,7 +19,7 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.child import ChildDiedError, run_child
 from tolcontact.errors import ArchiveError
-from tolcontact.input_files import fault_of
+from tolcontact.input_files import fault_of, is_archive
 from tolcontact.system import files
 from tolcontact.system.machine import limit_resources
 from tolcontact.texts import CONTROL_CHARACTERS, shown
@@ -89,6 +89,12 @@ def check_name(path: Path) -> None:
         os.fsencode(path).decode(sys.getfilesystemencoding())
     except UnicodeError as error:
         raise ArchiveError(f'"{path}": its name is not text, so netCDF cannot use it; rename the file') from error
+
+
+def check_ending(path: str | Path) -> None:
+    """Raise ArchiveError unless the path of an archive to write has the extension by which archives are known."""
+    if not is_archive(path):
+        raise ArchiveError(f'"{path}" is not the name of an archive; expected one that ends in .nc')
 
 
 class DamagedError(Exception):

@@ -20,7 +20,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.inspection import check_name
+from tolcontact.archive.inspection import check_ending, check_name
 from tolcontact.archive.rows import Row
 from tolcontact.errors import ArchiveError, OptionError
 from tolcontact.replacing import remove_abandoned, replacing
@@ -156,6 +156,7 @@ def locked_archive(path: str | Path, *, overwrite: bool = False, resume: bool = 
         raise ArchiveError(f'archive "{path}" cannot be written: folder "{real.parent}" does not exist; create it first')
     if real.exists() and not real.is_file():
         raise ArchiveError(f'archive "{path}" cannot be written: it is not a file')
+    check_ending(path)
     lock = real.with_name(f".{real.name}.lock")
     holding = FileLock(lock, timeout=0)
     try:

@@ -13,7 +13,7 @@ import numpy as np
 
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.archive.header import empty_checks, write_header
-from tolcontact.archive.inspection import check_archive, inspect
+from tolcontact.archive.inspection import check_archive, check_ending, inspect
 from tolcontact.archive.journal import Checkpoint, Journal, locked_archive
 from tolcontact.archive.reader import check_rows, open_unchecked
 from tolcontact.archive.rows import check_room, kept_rows
@@ -227,6 +227,7 @@ def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Prog
 
     It takes none if it holds a complete one of this analysis, unless that one grows and is of fewer realizations.
     """
+    check_ending(path)
     archive = Path(os.path.realpath(path))
     check_archive(archive)
     with open_netcdf(archive, "r") as file:
@@ -254,7 +255,7 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: "xr.Dataset", 
     The file is replaced only when all of the new one is written.
     """
     with locked_archive(path, resume=True) as archive:
-        check_room_for(archive, record, program, int(dataset.attrs.get("realizations", 0)))
+        check_room_for(path, record, program, int(dataset.attrs.get("realizations", 0)))
         with replacing_archive(archive) as part:
             shutil.copyfile(archive, part)
             stored = dataset.copy()

@@ -14,9 +14,10 @@ from tolcontact.cli import app as common
 from tolcontact.cli.analyses import COMMANDS, REQUIRED, AnalysisCommand
 from tolcontact.cli.output import console, print_csv, print_data
 from tolcontact.cli.progress import shown_progress
+from tolcontact.input_files import is_archive
 from tolcontact.report import analysis_text
 from tolcontact.simulation.cluster import client_of
-from tolcontact.workflow.models import DEFAULT_SOLVER, is_archive
+from tolcontact.workflow.models import DEFAULT_SOLVER
 
 SHARED = {  # options of analyses, with their defaults, and the argument of an analysis that an option needs
     "seed": (common.Seed, 1, "seed"), "solver": (common.Solver, DEFAULT_SOLVER, "solver"),

@@ -21,6 +21,7 @@ from tolcontact.declaration.values import key_faults
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.geometry import parts_from
+from tolcontact.input_files import is_archive
 from tolcontact.plausibility import drawing_remarks, elastic_remarks
 from tolcontact.pmi import read_pmi
 from tolcontact.pmi.declared import declared_file
@@ -164,7 +165,7 @@ def view(
     check_outputs([source], page=out, overwrite=overwrite)
     path = out.absolute() if out else temporary_page(source)  # a script may change the working folder
     with waiting(f"reading {source}"):
-        if source.suffix.lower() == ".nc":
+        if is_archive(source):
             with open_archive(source) as results:
                 write_page(results, summarize(results), path)
         elif source.suffix.lower() in STEP:

@@ -11,6 +11,7 @@ from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model, write_json
 from tolcontact.discretization import discretize
 from tolcontact.errors import ArchiveError, ModelError, OptionError, TolcontactError
+from tolcontact.input_files import is_archive
 from tolcontact.method import Method, Solver
 from tolcontact.plausibility import warn_of_nominal
 from tolcontact.replacing import check_identities
@@ -106,11 +107,6 @@ def _loaded(path: str | Path) -> tuple[Assembly, Method | None]:
             raise ArchiveError(
                 f'the model in "{path}" cannot be rebuilt, so name its script instead of the archive: {error}'
             ) from error
-
-
-def is_archive(path: str | Path) -> bool:
-    """Return whether a path has the extension of an archive."""
-    return Path(path).suffix.lower() == ".nc"
 
 
 def method_of(assembly: Assembly, method: Choice | None, default: Method | None = None) -> Method:

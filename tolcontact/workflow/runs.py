@@ -131,7 +131,7 @@ def run(
     `model` is anything that `build` takes or returns. A Program has its solver and method already; the default solver is
     qpoases, and the default method is the model's own.
     The same `seed` gives the same draws, also with other methods and numbers of `samples`.
-    `out` is the path of the archive; `overwrite` replaces a file there. Without it, the results stay in memory.
+    `out` is the path of the archive, which ends in .nc; `overwrite` replaces a file there. Without it, results stay in memory.
     `keep` states what the archive stores for each realization: "measures" (with gaps, status and residuals), "poses" (also the
     poses), or "all" (also the deviations). Displacement fields always come from all realizations.
     `fields` is the number of realizations that the magnitudes of displacement fields cover, starting from the first: a number,
