@@ -69,8 +69,15 @@ def test_a_comparison_replaces_none_of_the_runs_that_it_compares(tmp_path):
     (tmp_path / "link.nc").hardlink_to(tmp_path / "a.nc")
     before = (tmp_path / "a.nc").read_bytes()
     done = call(tmp_path, "compare", "a.nc", "b.nc", "--out", "link.nc", "--overwrite")
-    assert done.returncode == 2 and '"link.nc" would be the input and the archive' in done.stderr
+    assert done.returncode == 2 and '"link.nc" would be the input and the comparison' in done.stderr
     assert (tmp_path / "a.nc").read_bytes() == before
+    (tmp_path / "both.nc").touch()
+    for name, words in (
+        ("both.nc", '"both.nc" exists; choose another name, or replace it with --overwrite'),
+        ("both.html", '"both.html" is not the name of a comparison; expected one that ends in .nc'),
+    ):
+        done = call(tmp_path, "compare", "a.nc", "b.nc", "--out", name)
+        assert done.returncode == 2 and words in done.stderr and "--resume" not in done.stderr
 
 
 def test_an_archive_has_the_ending_by_which_commands_know_it(tmp_path):

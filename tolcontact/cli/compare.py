@@ -14,6 +14,7 @@ from tolcontact.cli import app as common
 from tolcontact.cli.output import check_outputs, console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError
+from tolcontact.input_files import is_archive
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.simulation.cluster import client_of
 from tolcontact.system import files
@@ -56,7 +57,7 @@ def compare(
 
     For a model, print agreement, failures, residuals and time. For archives, print how measurements change.
     """
-    are_archives = [path.suffix.lower() == ".nc" for path in inputs]
+    are_archives = [is_archive(path) for path in inputs]
     if not all(are_archives) and len(inputs) > 1:
         raise OptionError(f"{', '.join(map(str, inputs))} are neither one model nor archives (.nc)")
     options = [name for name in MODEL_OPTIONS if name in common.set_options(context)]
@@ -64,7 +65,7 @@ def compare(
         raise OptionError(f"--{options[0]} applies to a model; archives have their own")
     if report is not None and not all(are_archives):
         raise OptionError("--report applies to archives; write an archive for each solver (run --out), and compare these")
-    check_outputs(inputs, archive=out, page=report, overwrite=overwrite)
+    check_outputs(inputs, comparison=out, page=report, overwrite=overwrite)
     with contextlib.nullcontext() if out is None else locked_archive(out, overwrite=overwrite) as path:
         if all(are_archives):
             comparison = _compare_archives(inputs, report)

@@ -31,7 +31,7 @@ Author = Annotated[str | None, typer.Option(help="Author of the report.", rich_h
 Revision = Annotated[str | None, typer.Option(help="Revision of the model or of its drawing.", rich_help_panel="Title block")]
 Date = Annotated[str | None, typer.Option(help="Date of the report, as text.", rich_help_panel="Title block")]
 Company = Annotated[str | None, typer.Option(help="Company that issues the report.", rich_help_panel="Title block")]
-ENDINGS = {"page": (".html", ".htm"), "spreadsheet": (".xlsx",)}
+ENDINGS = {"comparison": (".nc",), "page": (".html", ".htm"), "spreadsheet": (".xlsx",)}
 ENTRIES = tuple(TitleBlock().entries)  # in the order of these options
 
 
@@ -44,15 +44,17 @@ def check_outputs(
     inputs: Iterable[Path],
     *,
     archive: Path | None = None,
+    comparison: Path | None = None,
     page: Path | None = None,
     spreadsheet: Path | None = None,
     overwrite: bool = False,
 ) -> None:
     """Raise OptionError unless a command may write its outputs: none is an input or another output, by whatever name.
 
-    Pages of tolcontact are replaced, other pages and spreadsheets only with `overwrite`. Archives are checked when locked.
+    Pages of tolcontact are replaced; other pages, spreadsheets and comparisons only with `overwrite`. Archives are checked when
+    they are locked.
     """
-    named = {"archive": archive, "page": page, "spreadsheet": spreadsheet}
+    named = {"archive": archive, "comparison": comparison, "page": page, "spreadsheet": spreadsheet}
     outputs = {name: path for name, path in named.items() if path is not None}
     check_identities(inputs, outputs)
     for name, path in outputs.items():
