@@ -1,11 +1,13 @@
 """Stacks in one dimension: published figures, sensitivities, tables of links, and chains in assemblies."""
 
 import io
+import json
 import math
 import re
 
 import numpy as np
 import openpyxl
+import pandas as pd
 import pytest
 import xarray as xr
 from rich.console import Console
@@ -190,6 +192,18 @@ def test_a_resumed_stack_has_the_stack_up_of_all_its_realizations(tmp_path):
     assert added.returncode == 0 and call(tmp_path, *run, 35).stdout.count("of brackets: 40 realizations") == 1
     refused = call(tmp_path, "stackup", "m.nc", "--into", "m.nc", "--samples", 40)
     assert refused.returncode == 2 and "choose another archive, or more samples than its 40" in refused.stderr
+
+
+def test_the_csv_of_a_stack_up_has_the_range_of_the_realizations(tmp_path):
+    tc.io.write_model(brackets(), tmp_path / "m.json")
+    options = ("stackup", "m.json", "--samples", 3000, "--quiet")
+    table = pd.read_csv(io.StringIO(call(tmp_path, *options, "--csv").stdout), index_col=["measure", "approach"])
+    data = json.loads(call(tmp_path, *options, "--json").stdout)["data_vars"]
+    ends = table[[f"{end} {name}" for end in ("least", "largest") for name in ("estimate", "lower", "upper")]]
+    states = [f"99.73 %, {word}" for word in ("without contact", "with contact")]
+    simulated = ends.loc[[(measure, state) for measure in ("first", "second") for state in states]]
+    assert np.allclose(simulated.values.reshape(2, 2, 2, 3), data["simulated"]["data"])
+    assert np.allclose(table["half_width"].dropna().values.reshape(2, 4), data["half_width"]["data"])
 
 
 def test_a_stack_has_all_analyses():

@@ -1,8 +1,10 @@
 """Mechanisms swept through their positions: envelopes against closed forms, from the same draws everywhere."""
 
+import io
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy import stats
 
@@ -90,6 +92,10 @@ def test_a_script_is_swept_by_the_command_line(tmp_path):
     assert all(text in done.stdout for text in ("200 realizations at 3 positions", "angle 1 (100 %)", "beyond limits")), done
     data = json.loads(call(tmp_path, "sweep", "arm.py", "--over", "angle=0,0.5,1", "--samples", 200, "--json").stdout)
     assert data["dims"]["position"] == 3
+    done = call(tmp_path, "sweep", "arm.py", "--over", "angle=0,0.5,1", "--samples", 200, "--csv", "--quiet")
+    rows = pd.read_csv(io.StringIO(done.stdout)).groupby(["measure", "state"])
+    shares = rows[["outside estimate", "outside lower", "outside upper"]].first()
+    assert np.allclose(shares.values, data["data_vars"]["outside"]["data"][0]) and rows.size().tolist() == [6, 6]
     failed = call(tmp_path, "sweep", "arm.py", "--over", "angel=0,1", "--samples", 20)
     assert failed.returncode == 2 and ": assembly(angle) got an unexpected keyword argument 'angel'" in failed.stderr
     failed = call(tmp_path, "sweep", "arm.py", "--over", "angle=0,1", "--over", "angle=2,3", "--samples", 20)

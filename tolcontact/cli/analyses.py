@@ -63,6 +63,22 @@ def _columns(names: list[str], dim: str) -> Frame:
     return frame
 
 
+def _ranges(dataset: "xr.Dataset") -> Any:
+    """Return the linear figures of a stack-up, and in rows of their own the simulated ranges with their intervals."""
+    rows = [f"99.73 %, {word}" for word in terms.STATE_WORDS]
+    values = dataset[["drawn", "centred", "half_width"]].reindex({terms.APPROACH: [*terms.APPROACHES, *rows]}).to_dataframe()
+    simulated = dataset["simulated"].rename({terms.STATE: terms.APPROACH}).assign_coords({terms.APPROACH: rows})
+    ends = simulated.to_series().unstack([terms.END, terms.INTERVAL])
+    ends.columns = [" ".join(column) for column in ends.columns]
+    return values.join(ends)
+
+
+def _envelopes(dataset: "xr.Dataset") -> Any:
+    """Return the envelopes of a sweep, and beside them the share of realizations that are outside at any position."""
+    shares = dataset["outside"].to_series().unstack(terms.INTERVAL).add_prefix("outside ")
+    return _intervals("envelope")(dataset).join(shares)
+
+
 def _trials(dataset: "xr.Dataset") -> Any:
     return dataset["tried"].to_pandas().assign(value=dataset["tried_value"].values).set_index("x")
 
@@ -133,7 +149,7 @@ COMMANDS = (
         terms.STACK_UP,
         "Number of realizations.",
         ("stackup stack.py", "stackup run.nc --into run.nc"),
-        lambda dataset: dataset[["drawn", "centred", "half_width"]].to_dataframe(),
+        _ranges,
     ),
     AnalysisCommand(
         "contributions",
@@ -253,7 +269,7 @@ COMMANDS = (
         terms.SWEEP,
         "Number of realizations, the same at all positions.",
         ("sweep hinge.py --over angle=0:1.5:7", "sweep slider.py --over slide=0,10,25 --over load=5,5,8 --csv > envelope.csv"),
-        _intervals("envelope"),
+        _envelopes,
         options={
             "over": (
                 Annotated[
