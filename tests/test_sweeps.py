@@ -102,13 +102,37 @@ def test_a_script_is_swept_by_the_command_line(tmp_path):
     assert failed.returncode == 2 and '--over has "angle" 2 times; give all its values at once' in failed.stderr
     failed = call(tmp_path, "sweep", "arm.py", "--over", "angle=fast", "--samples", 20)
     assert failed.returncode == 2 and "expected --over angle=0:1.5:7 (from, to, number)" in failed.stderr
+    failed = call(tmp_path, "sweep", "arm.py", "--over", "angle=0:1:1000000000", "--samples", 20)
+    assert failed.returncode == 2 and '--over is "angle=0:1:1000000000"; expected at most 1000 positions' in failed.stderr
+
+
+def test_whole_numbers_reach_the_script_as_such(tmp_path):
+    (tmp_path / "stairs.py").write_text(
+        "import tolcontact as tc\n\n\n"
+        "def assembly(steps: int, rise=0.1):\n"
+        '    stairs = tc.Stack("stairs")\n'
+        '    stairs.link("steps", sum(rise + 1 for _ in range(steps)), 0.1)\n'
+        '    stairs.gap("height")\n'
+        "    return stairs\n"
+    )
+    for steps in ("1,2,3", "1:3:3"):
+        options = ("--over", f"steps={steps}", "--over", "rise=0:1:3", "--samples", 20, "--json", "--quiet")
+        done = call(tmp_path, "sweep", "stairs.py", *options)
+        assert done.returncode == 0, done.stderr
+        assert json.loads(done.stdout)["data_vars"]["parameter"]["data"] == [[1, 2, 3], [0, 0.5, 1]]
+
+
+def test_the_help_of_a_sweep_says_that_it_takes_a_script(tmp_path):
+    assert "MODEL.py" in (said := call(tmp_path, "sweep", "--help").stdout) and "RUN.nc" not in said
 
 
 @pytest.mark.parametrize(
     ("model", "over", "message"),
     [
         (arm, {"angle": [0.0]}, "over has values: 1 of angle; expected two or more"),
-        (arm, {"angle": [0, 1], "slide": [0]}, "2 of angle, 1 of slide; expected two or more, and equally many"),
+        (arm, {"angle": [0, 1], "slide": [0]}, "2 of angle, 1 of slide; expected two or more, up to 1000, and equally many"),
+        (arm, {"angle": range(1001)}, "1001 of angle; expected two or more, up to 1000"),
+        (arm, {"angle": [0, 10**400]}, "expected values of each parameter"),
         (arm, {"angel": [0, 1]}, r"over does not fit the model: arm\(angle\) got an unexpected keyword argument 'angel'"),
         (arm, {"angle": ["fast", 1]}, "expected values of each parameter"),
         (arm(), {"angle": [0, 1]}, "the model is a Assembly; expected a function of angle"),

@@ -4,6 +4,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,7 @@ def sweep(
         by_status      (position, status_meaning)    number of realizations
 
     model     function that declares the assembly from the parameters, as in `def assembly(angle=0.0)`, or a script with one
-    over      values of each parameter, equally many: `tc.analyses.sweep(assembly, {"angle": [0, 0.5, 1]})`
+    over      values of each parameter, equally many, up to 1000: `tc.analyses.sweep(assembly, {"angle": [0, 0.5, 1]})`
 
     A realization has the same deviations at all positions: contributors must have the same labels there. Realizations that
     cannot be assembled at a position are left out of the envelope with contact, and count as outside. What lies between two
@@ -82,25 +83,32 @@ def sweep(
             values[name].append(of_states)
     values |= {
         "swept": list(swept),
-        "parameter": [[point[name] for point in points] for name in over],
+        "parameter": [[float(point[name]) for point in points] for name in over],
         "by_status": [analysis.statuses for analysis in analyses],
     }
     return analyses[0].dataset(values, {terms.PARAMETER_NAME: list(over)}, realizations=samples, positions=len(points))
 
 
 def _points(over: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
-    """Return the parameters of each position. Raises OptionError unless there are as many values of each."""
+    """Return the parameters of each position; whole numbers stay so. Raises OptionError unless there are as many of each."""
     try:
-        values = {str(name): [float(value) for value in of_name] for name, of_name in over.items()}
-    except (AttributeError, TypeError, ValueError) as error:
+        values = {str(name): list(map(_number, of_name)) for name, of_name in over.items()}
+    except (AttributeError, TypeError, ValueError, OverflowError) as error:
         raise OptionError(f'over is {over!r}; expected values of each parameter, such as {{"angle": [0, 0.5, 1]}}') from error
     counts = {name: len(of_name) for name, of_name in values.items()}
-    if not counts or len(set(counts.values())) > 1 or min(counts.values()) < 2:
+    if len(set(counts.values())) != 1 or not 2 <= min(counts.values()) <= terms.MAX_POSITIONS:
         listed = ", ".join(f"{count} of {name}" for name, count in counts.items()) or "none"
-        raise OptionError(f"over has values: {listed}; expected two or more, and equally many of each parameter")
+        raise OptionError(
+            f"over has values: {listed}; expected two or more, up to {terms.MAX_POSITIONS}, and equally many of each parameter"
+        )
     if not all(math.isfinite(value) for of_name in values.values() for value in of_name):
         raise OptionError("over has a value that is no finite number")
     return [dict(zip(values, point, strict=True)) for point in zip(*values.values(), strict=True)]
+
+
+def _number(value: float) -> float:
+    number = float(value)
+    return int(value) if isinstance(value, Integral) else number
 
 
 def _at(model: Mechanism, point: Mapping[str, float]) -> Callable[[], Assembly]:

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -126,19 +127,31 @@ def _with_points(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _values(text: str) -> tuple[str, list[float]]:
+    """Return the name and the values of a parameter; whole numbers remain whole."""
     name, _, value = text.partition("=")
     try:
         if not name:
             raise ValueError
         if ":" not in value:
-            return name, [float(number) for number in value.split(",")]
+            return name, list(map(_number, value.split(",")))
         first, last, count = value.split(":")
-        start, steps = float(first), int(count) - 1
-        return name, [start + (float(last) - start) * k / (steps or 1) for k in range(steps + 1)]
-    except ValueError:
+        start, end, steps = _number(first), _number(last), int(count) - 1
+        if steps >= terms.MAX_POSITIONS:
+            raise OptionError(f'--over is "{text}"; expected at most {terms.MAX_POSITIONS} positions')
+        values = [start + (end - start) * k / (steps or 1) for k in range(steps + 1)]
+        are_whole = isinstance(start + end, int)
+        return name, [int(number) if are_whole and number.is_integer() else number for number in values]
+    except (ValueError, OverflowError):
         raise OptionError(
             f'--over is "{text}"; expected --over angle=0:1.5:7 (from, to, number) or --over angle=0,0.5,1'
         ) from None
+
+
+def _number(text: str) -> float:
+    try:
+        return int(text)
+    except ValueError:
+        return float(text)
 
 
 COMMANDS = (
@@ -271,13 +284,19 @@ COMMANDS = (
         ("sweep hinge.py --over angle=0:1.5:7", "sweep slider.py --over slide=0,10,25 --over load=5,5,8 --csv > envelope.csv"),
         _envelopes,
         options={
+            "model": (
+                Annotated[
+                    Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly(...) of parameters.")
+                ],
+                REQUIRED,
+            ),
             "over": (
                 Annotated[
                     list[str],
                     typer.Option(metavar="NAME=VALUES", help="Values of a parameter: 0:1.5:7 (from, to, number) or 0,0.5,1."),
                 ],
                 REQUIRED,
-            )
+            ),
         },
         arguments=_with_points,
     ),

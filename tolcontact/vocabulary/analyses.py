@@ -30,6 +30,7 @@ APPROACH, APPROACHES = "approach", ("worst case", "RSS", "MRSS", "1.5 RSS")  # t
 OF_EFFECT, EFFECTS = "of_effect", ("6 sigma", OUTSIDE)
 OF_ENVELOPE, ENVELOPE = "of_envelope", ("mean", "6 sigma", "outer percentile")  # of extremes over the positions of a mechanism
 PARAMETER_NAME = "parameter_name"
+MAX_POSITIONS = 1000  # of a mechanism: each is a model of its own, which is kept
 FIXED_LABELS = {
     STATE: STATES, INTERVAL: ESTIMATE, STATUS_MEANING: STATUS_MEANINGS, AXIS: AXES, BODY_AXIS: AXES,
     CONTACT: CONTACT_STATES, END: ENDS, STAGE: STAGES, OF_EFFECT: EFFECTS,
