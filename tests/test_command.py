@@ -27,7 +27,8 @@ OPTIONS = {
     "refused solver": (["--solver", "superscs"], ["refused", "wrong answers", "daqp"]),
     "too few samples": (["--samples", "0"], ["samples is 0"]),
     "negative seed": (["--seed", "-1"], ["seed is -1"]),
-    "output in a folder that does not exist": (["--out", "nowhere/out.nc"], ["nowhere", "does not exist"]),
+    "output in a folder that does not exist": (["--out", "nowhere/out.nc"], ["there is no folder", "nowhere", "make it"]),
+    "output in a file": (["--out", "model.py/out.nc"], ["model.py", "is not a folder; choose another place"]),
     "output that is a folder": (["--out", "."], ["not a file"]),
     "output on a device that is no disk": (["--out", "/proc/out.nc"], ["/proc/out.nc", "cannot be written"]),
 }
@@ -74,6 +75,19 @@ def test_a_file_that_is_no_archive_is_refused(tmp_path):
     done = call(tmp_path, "run", write_model(tmp_path), "--out", "notes.nc", "--resume")
     assert done.returncode == 2
     assert (tmp_path / "notes.nc").read_text() == "these are notes\n"
+
+
+def test_the_name_of_a_file_that_is_no_model_is_refused_with_those_that_are(tmp_path):
+    for name in ("run.nc", "part.stl"):
+        (tmp_path / name).touch()
+    for command, name, words in (
+        ("check", "run.nc", "expected one that ends in .py or .json; tolcontact summary and report show an archive\n"),
+        ("run", "run.nc", "expected one that ends in .py or .json; tolcontact summary and report show an archive\n"),
+        ("run", "part.stl", '"part.stl" is not the name of a model; expected one that ends in .py or .json\n'),
+        ("view", "part.stl", "expected one that ends in .py, .json, .nc, .step, .stp\n"),
+    ):
+        done = call(tmp_path, command, name)
+        assert (done.returncode, done.stdout) == (2, "") and done.stderr.endswith(words), done.stderr
 
 
 @pytest.mark.slow

@@ -15,7 +15,9 @@ def test_it_is_named_after_its_file(name, tmp_path):
 
 
 def test_it_is_checked_and_run_as_it_is(tmp_path):
-    assert call(tmp_path, "new", "été 2").returncode == 0
+    done = call(tmp_path, "new", "été 2")
+    assert done.returncode == 0 and done.stdout.splitlines()[1:] == ["next: tolcontact check 'été 2.py'"]
+    assert "    tolcontact view 'été 2.py'\n" in (tmp_path / "été 2.py").read_text(encoding="utf-8")
     done = call(tmp_path, "check", "été 2.py")
     assert done.returncode == 0 and "no faults found" in done.stdout
     done = call(tmp_path, "run", "été 2.py", "--samples", "100", "--surfaces", "8")

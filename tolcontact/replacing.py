@@ -26,6 +26,15 @@ def _is_same(path: Path, target: Path) -> bool:
     return str(path.resolve()).casefold() == str(target.resolve()).casefold()
 
 
+def folder_fault(path: Path) -> str:
+    """Return why there is no folder for a file, with what to do; empty if there is one."""
+    if path.parent.is_dir():
+        return ""
+    if path.parent.exists():
+        return f'"{path.parent}" is not a folder; choose another place'
+    return f'there is no folder "{path.parent}"; make it first'
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield the path of a new, empty file to write to, which then replaces `path`.

@@ -23,7 +23,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.archive.inspection import check_ending, check_name
 from tolcontact.archive.rows import Row
 from tolcontact.errors import ArchiveError, OptionError
-from tolcontact.replacing import remove_abandoned, replacing
+from tolcontact.replacing import folder_fault, remove_abandoned, replacing
 from tolcontact.system import files
 
 WRITTEN_BYTES = 1 << 24  # that the netCDF library writes together; each call takes as long as many realizations
@@ -152,8 +152,8 @@ def locked_archive(path: str | Path, *, overwrite: bool = False, resume: bool = 
         raise OptionError("an archive cannot be overwritten and resumed; choose one of the two")
     real = Path(os.path.realpath(path))
     check_name(real)
-    if not real.parent.is_dir():
-        raise ArchiveError(f'archive "{path}" cannot be written: folder "{real.parent}" does not exist; create it first')
+    if fault := folder_fault(real):
+        raise ArchiveError(f'archive "{path}" cannot be written: {fault}')
     if real.exists() and not real.is_file():
         raise ArchiveError(f'archive "{path}" cannot be written: it is not a file')
     check_ending(path)

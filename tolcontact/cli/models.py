@@ -1,6 +1,8 @@
 """tolcontact new, tolcontact check, tolcontact view, tolcontact guide."""
 
 import json
+import re
+import shlex
 import tempfile
 import warnings
 from collections.abc import Sequence
@@ -33,6 +35,7 @@ PRESS = (
     "advice: pins or bolts stand in holes, and no force holds the parts together, so contact may lift or tilt them; declare "
     'what does (a weight, a clamp): assembly.force(...), with objective "seating"'
 )
+MODELS = (".py", ".json")
 STARTERS = {False: Path(__file__).with_name("starter.py"), True: Path(__file__).with_name("stack_starter.py")}
 
 
@@ -46,8 +49,8 @@ def new(
     if faults := list(key_faults("model", [path.stem])):
         raise OptionError(faults[0])
     text = STARTERS[stack].read_text(encoding="utf-8")
-    text = text.replace('("starter"', f"({json.dumps(path.stem)}").replace("NAME.", f"{path.stem}.")
-    text = text.replace(" (NAME is this file without its ending)", "")
+    text = text.replace('("starter"', f"({json.dumps(path.stem)}").replace(" (NAME is this file without its ending)", "")
+    text = re.sub(r"NAME\.\w+", lambda name: shlex.quote(name[0].replace("NAME", path.stem)), text)
     try:
         with path.open("x", encoding="utf-8") as file:
             try:
@@ -60,7 +63,7 @@ def new(
         raise OptionError(f'"{path}" exists already, and was not changed; choose another name') from error
     except OSError as error:
         raise OptionError(f'"{path}" cannot be written: {error.strerror}') from error
-    common.echo(f"model: {path}\nnext: tolcontact check {path}")
+    common.echo(f"model: {path}\nnext: tolcontact check {shlex.quote(str(path))}")
 
 
 @common.app.command(epilog=common.examples("check model.py", "check model.py --view", "check part.stp --drawing"))
@@ -172,6 +175,9 @@ def view(
             model = Assembly(source.stem)
             parts_from(model, source)
             write_view(model, None, [], path)
+        elif source.is_file() and source.suffix.lower() not in MODELS:
+            accepted = ", ".join((*MODELS, ".nc", *STEP))
+            raise OptionError(f'"{source}" is not a name of what is shown; expected one that ends in {accepted}')
         else:
             model = load_model(source)
             write_view(model, *nominal_and_faults(model), path)

@@ -16,7 +16,7 @@ from tolcontact.cli.app import echo
 from tolcontact.declaration import Assembly, TitleBlock
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError
-from tolcontact.replacing import check_identities
+from tolcontact.replacing import check_identities, folder_fault
 from tolcontact.texts import csv_cell
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
@@ -63,8 +63,8 @@ def check_outputs(
         expected = ENDINGS[name]
         if path.suffix.lower() not in expected:
             raise OptionError(f'"{path}" is not the name of a {name}; expected one that ends in {expected[0]}')
-        if not path.parent.is_dir():
-            raise OptionError(f'{name} "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
+        if fault := folder_fault(path):
+            raise OptionError(f'{name} "{path}" cannot be written: {fault}')
         if not overwrite and path.exists() and not (name == "page" and report.is_page(path)):
             what = ", and is not a tolcontact page" if name == "page" else ""
             raise OptionError(f'"{path}" exists{what}; choose another name, or replace it with --overwrite')

@@ -22,7 +22,7 @@ from tolcontact.declaration.geometry import Mesh
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face
 from tolcontact.errors import ScriptError, TolcontactError, nearest_name
-from tolcontact.input_files import fault_of
+from tolcontact.input_files import fault_of, is_archive
 from tolcontact.replacing import replacing
 from tolcontact.texts import clipped
 
@@ -99,7 +99,8 @@ def load_model(path: Path, arguments: Mapping[str, Any] = NO_ARGUMENTS) -> Assem
     # The module's name has a space: a model random.py must not shadow the module `random`.
     spec = importlib.util.spec_from_file_location(f"model {path.stem}", path.absolute())
     if spec is None or spec.loader is None:
-        raise ScriptError(f'model script "{path}" is not a Python file; expected a name that ends in .py')
+        remedy = "; tolcontact summary and report show an archive" if is_archive(path) else ""
+        raise ScriptError(f'"{path}" is not the name of a model; expected one that ends in .py or .json{remedy}')
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     folder = str(path.parent.resolve())
