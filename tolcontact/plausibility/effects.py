@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolcontact import poses as pose
 from tolcontact.compilation import Program
 from tolcontact.declaration import Feature, Measure, Pattern, Point
 from tolcontact.discretization import Nominal, NominalPart
@@ -92,15 +93,17 @@ def _unvaried_measures(draws: TrialDraws) -> Iterator[str]:
     program, nominal, measured = draws.program, draws.program.nominal, draws.measured.T
     still = [k for k, x in enumerate(measured) if len(x) and np.isfinite(x).all() and np.ptp(x) <= MIN_MOTION]
     on_pose = _dependence(program, "observe", "poses", "measured") if still else np.zeros(0)
-    owners = {k: np.flatnonzero(on_pose[k].reshape(len(nominal.parts), -1).any(axis=1)) for k in still}
+    owners = {k: np.flatnonzero(on_pose[k].reshape(-1, pose.ENTRIES).any(axis=1)) for k in still}
     unmoved = [k for k, parts in owners.items() if not any(nominal.may_differ(int(part)) for part in parts)]
     if unmoved:
-        parts = " and ".join(f'"{nominal.parts[part].name}"' for part in owners[unmoved[0]][:LISTED]) or "its parts"
+        parts = " and ".join(f'"{nominal.parts[part].name}"' for part in owners[unmoved[0]][:LISTED])
         others = f", nor do {len(unmoved) - 1} more measurements" if len(unmoved) > 1 else ""
-        yield (
-            f"{nominal.measures[unmoved[0]].designation}: it does not vary{others}: no tolerance changes it, and contact does "
-            f"not move {parts}; measure what varies, or give these parts tolerances"
+        reason = (
+            f"no tolerance changes it, and contact does not move {parts}; measure what varies, or give these parts tolerances"
+            if parts
+            else "what it depends on has no tolerance, or cancels; let it depend on what varies, or leave it out"
         )
+        yield f"{nominal.measures[unmoved[0]].designation}: it does not vary{others}: {reason}"
 
 
 def unused_features(draws: TrialDraws) -> Iterator[str]:
