@@ -1,5 +1,7 @@
 """Measures that are not numbers for some deviations: no answer counts these realizations as good or bad without a word."""
 
+import json
+
 import casadi
 import numpy as np
 import pytest
@@ -105,7 +107,10 @@ def assembly():
     a.measure("u", lambda p: casadi.sqrt(p.rotation(block)[2, 0]), {limits})
     return a
 """)
-    done = call(tmp_path, "run", script, "--samples", "200", "--solver", "daqp")
+    done = call(tmp_path, "run", script, "--samples", "200", "--solver", "daqp", "--out", "block.nc")
     line = next(line for line in done.stdout.splitlines() if line.startswith("u: "))
     assert line.startswith("u: not a number in ") and line.endswith(f" of the realizations, so it has no {word}")
     assert 40 < float(line.split()[5]) < 60 and done.returncode == code and "invalid value" not in done.stderr
+    done = call(tmp_path, "summary", "block.nc", "--json")
+    figures = json.loads(done.stdout, parse_constant=pytest.fail)["data_vars"]["statistic_value"]["data"]
+    assert figures[0][1][0] == [None] * 3

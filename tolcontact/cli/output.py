@@ -1,6 +1,7 @@
 """Output of results, checks of output files, and the options that replace entries of a title block of a report."""
 
 import json
+import math
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -85,9 +86,7 @@ def print_summary(summary: xr.Dataset, *, is_whole: bool = False) -> None:
 
 def print_data(dataset: xr.Dataset) -> None:
     """Print a dataset as JSON, which has no NaN or infinity: they are null, and the texts "Infinity" and "-Infinity"."""
-    data = dataset.reset_coords()
-    numbers = {name: values.copy(data=_as_json(values.values)) for name, values in data.items() if values.dtype.kind == "f"}
-    echo(json.dumps(data.assign(numbers).to_dict(), allow_nan=False, default=_plain))
+    echo(json.dumps(_as_json(dataset.reset_coords().to_dict()), allow_nan=False, default=_plain))
 
 
 def print_csv(frame: "pd.DataFrame") -> None:
@@ -96,11 +95,15 @@ def print_csv(frame: "pd.DataFrame") -> None:
     echo(cells.to_csv(lineterminator="\n"), nl=False)
 
 
-def _as_json(values: np.ndarray) -> np.ndarray:
-    objects = values.astype(object)
-    for word, places in ((None, np.isnan(values)), ("Infinity", values == np.inf), ("-Infinity", values == -np.inf)):
-        objects[places] = word
-    return objects
+def _as_json(value: object) -> object:
+    """Return the value of a dataset's dictionary, with all that it holds, as print_data prints it."""
+    if isinstance(value, dict):
+        return {key: _as_json(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_as_json(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    return value
 
 
 def _plain(value: object) -> object:
