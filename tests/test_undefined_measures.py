@@ -111,6 +111,9 @@ def assembly():
     line = next(line for line in done.stdout.splitlines() if line.startswith("u: "))
     assert line.startswith("u: not a number in ") and line.endswith(f" of the realizations, so it has no {word}")
     assert 40 < float(line.split()[5]) < 60 and done.returncode == code and "invalid value" not in done.stderr
+    assert done.stdout.endswith("archive: block.nc\n")
+    said = {option: call(tmp_path, "summary", "block.nc", *option) for option in [(), ("--all",), ("--limits",), ("--csv",)]}
+    assert [(answer.returncode, answer.stderr) for answer in said.values()] == [(code, "")] * 4
     done = call(tmp_path, "summary", "block.nc", "--json")
     figures = json.loads(done.stdout, parse_constant=pytest.fail)["data_vars"]["statistic_value"]["data"]
-    assert figures[0][1][0] == [None] * 3
+    assert figures[0][1][0] == [None] * 3 and done.returncode == code

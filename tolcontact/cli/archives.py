@@ -16,10 +16,10 @@ from tolcontact.cli.output import (
     Revision,
     Title,
     check_outputs,
+    check_verdicts,
     console,
     print_csv,
     print_data,
-    print_summary,
     title_entries,
 )
 from tolcontact.cli.progress import waiting
@@ -37,7 +37,11 @@ def summary(
     limits: Annotated[bool, flag("--limits", "Print only shares out of specification, and capability.")] = False,
     whole: Annotated[bool, flag("--all", "Print all figures of all measurements, parts and pairs, also of many.")] = False,
 ) -> None:
-    """Print the statistics of an archive."""
+    """Print the statistics of an archive.
+
+    The exit code is 1 if more than 0.1 % of the realizations were not resolved (not converged, not assemblable, or doubtful),
+    and if a measurement with limits is not a number in some.
+    """
     only_one(json=as_json, csv=as_csv, limits=limits, all=whole)
     estimates = workflow.summarize(archive)
     if as_csv:
@@ -50,7 +54,8 @@ def summary(
     elif limits:
         console().print(reports.capability_text(estimates))
     else:
-        print_summary(estimates, is_whole=whole)
+        console().print(reports.summary_text(estimates, is_whole=whole))
+    check_verdicts(estimates)
 
 
 @app.command(epilog=examples("report run.nc", "report run.nc --out page.html", "report run.nc --xlsx tables.xlsx"))

@@ -71,12 +71,11 @@ def check_outputs(
             raise OptionError(f'"{path}" exists{what}; choose another name, or replace it with --overwrite')
 
 
-def print_summary(summary: xr.Dataset, *, is_whole: bool = False) -> None:
-    """Print the summary of a run, briefly if not whole. Raises typer.Exit with code 1 if too many were not resolved.
+def check_verdicts(summary: xr.Dataset) -> None:
+    """Raise typer.Exit with code 1 if too many realizations of a run were not resolved.
 
     The same holds if a measurement with limits is not a number in some realizations.
     """
-    console().print(report.summary_text(summary, is_whole=is_whole))
     failed = sum(int(summary[BY_STATUS.name][status]) for status in UNRESOLVED)
     if failed > FAILED_SHARE * summary.attrs["realizations"]:
         echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)

@@ -12,7 +12,6 @@ import tolcontact
 from tolcontact import report as reports
 from tolcontact.archive import Run, open_unchecked
 from tolcontact.cli import app as common, output
-from tolcontact.cli.output import print_summary
 from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.errors import OptionError
 from tolcontact.realizations import archived_analysis
@@ -134,13 +133,14 @@ def _summed_up(path: Path, until: str | None, report: Path | None) -> tuple[Summ
 
 def _print_results(summary: Summary, stack: Dataset | None, out: Path | None, shortfall: str, *, quiet: bool) -> None:
     """Print the summary of results. Raises typer.Exit with code 1 if they lack something."""
-    print_summary(summary)
+    output.console().print(reports.summary_text(summary))
     if stack is not None:
         typer.echo()
         output.console().print(reports.analysis_text(STACK_UP, stack))
     if out is not None:
         common.echo(f"\narchive: {out}")
+    if shortfall and quiet:  # otherwise the log has already stated it
+        common.echo(shortfall, err=True)
+    output.check_verdicts(summary)
     if shortfall:
-        if quiet:  # otherwise the log has already stated it
-            common.echo(shortfall, err=True)
         raise typer.Exit(1)
