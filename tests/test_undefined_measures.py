@@ -77,6 +77,16 @@ def test_the_table_of_tails_says_what_is_not_defined(tmp_path):
     assert failed.stderr.startswith('error: "x": measurement "lg": not a finite number')
 
 
+def test_an_infinite_measure_is_no_number_and_numpy_says_nothing_of_it(tmp_path, recwarn):
+    model = block_with(lambda x: 1 / casadi.fmax(x, 0.0), limits=(None, 1e6))
+    with tc.run(model, samples=50, surfaces=0, fields="none") as results:
+        tc.report.write_page(results, tc.summarize(results), tmp_path / "page.html")
+    assert np.isnan(tc.analyses.sensitivities(model, samples=4)["nominal"].sel(measure="function")).all()
+    tc.analyses.contributions(model, samples=16)
+    tc.analyses.stack_up(model, samples=16)
+    assert not [str(warning.message) for warning in recwarn if issubclass(warning.category, RuntimeWarning)]
+
+
 @pytest.mark.parametrize("value", ["casadi.sqrt(-1 - x**2)", "1 / (0 * x)"])
 def test_a_measure_that_is_never_a_number_says_so_once(value, tmp_path):
     (script := tmp_path / "block.py").write_text(f"""import casadi, tolcontact as tc

@@ -24,7 +24,7 @@ from tolcontact.analyses.analysis import Analysis, Answer, Design, Progress, Res
 from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.method import Solver
-from tolcontact.simulation import Block
+from tolcontact.simulation import Block, defined_measures
 from tolcontact.statistics.intervals import UNDEFINED, Estimate, effective_count
 from tolcontact.statistics.variance_shares import missed, shapley_effects, sobol_indices
 from tolcontact.variation.draws import MIN_UNIFORM, Draws
@@ -222,7 +222,7 @@ def _linear_shares(program: Program, deviations: np.ndarray, slopes: np.ndarray,
 def _first_deviations(size: int, block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the measures, the deviations of the first of every `size` realizations, and the statuses of a block."""
     deviations = block.deviations[-block.start % size :: size]
-    return block.measured.copy(), deviations.copy(), block.status.copy()
+    return defined_measures(block), deviations.copy(), block.status.copy()
 
 
 class MixedDraws(Design):

@@ -77,11 +77,10 @@ def linear_model(program: Program) -> LinearModel:
         _observed(program, poses, np.zeros((len(poses), count))) for poses in (_motions(program, 1), _motions(program, -1))
     ]
     (measures,), (gaps,) = _observed(program, _at_rest(program, 1), np.zeros((1, count)))
-    with np.errstate(invalid="ignore"):  # for measures that are infinite
-        by_deviations, by_motion = (
-            [(ahead - behind).T / (2 * STEP) for ahead, behind in zip(*sides, strict=True)] for sides in (varied, moved)
-        )
-        kinked = np.array([_kinks(*(ends[0] - measures for ends in sides)) for sides in (varied, moved)])
+    by_deviations, by_motion = (
+        [(ahead - behind).T / (2 * STEP) for ahead, behind in zip(*sides, strict=True)] for sides in (varied, moved)
+    )
+    kinked = np.array([_kinks(*(ends[0] - measures for ends in sides)) for sides in (varied, moved)])
     return LinearModel(
         measures, by_deviations[0], by_motion[0], kinked, gaps, by_deviations[1], by_motion[1], _bilateral_motions(program),
         _displacements(program), sum(gaps is None for gaps in program.gaps),
@@ -103,10 +102,10 @@ def total_derivatives(program: Program) -> np.ndarray:
 def _kinks(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
     """Return whether each measure has a kink (measure,), from its changes (n, measure) by forward and backward steps.
 
-    At a kink the forward and the backward slope differ by more than a share of the largest slope.
+    At a kink the forward and the backward slope differ by more than a share of the largest slope, or one is not a number.
     """
     largest = np.maximum(np.abs(ahead), np.abs(behind)).max(axis=0, initial=STEP * MIN_SLOPE)
-    return np.asarray((np.abs(ahead + behind) > MAX_SLOPE_DIFFERENCE * largest).any(axis=0))
+    return ~(np.abs(ahead + behind) <= MAX_SLOPE_DIFFERENCE * largest).all(axis=0)
 
 
 def leverages(program: Program) -> np.ndarray:
@@ -132,8 +131,9 @@ def leverages(program: Program) -> np.ndarray:
 
 
 def _observed(program: Program, poses: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return measures (n, measure) and gaps (n, row) at poses (n, part * 12)."""
+    """Return measures (n, measure), not a number where infinite, and gaps (n, row) at poses (n, part * 12)."""
     measured, relative = program.observed(poses, deviations)
+    measured = np.where(np.isfinite(measured), measured, np.nan)
     rows = []
     for k, (pair, gaps) in enumerate(zip(program.nominal.pairs, program.gaps, strict=True)):
         if pair.samples_faces and not pair.is_springy:  # springs permit penetration

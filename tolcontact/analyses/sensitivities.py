@@ -13,7 +13,7 @@ from tolcontact.analyses.analysis import Analysis, Answer, Design, Progress, Res
 from tolcontact.analyses.linear_model import leverages, total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.method import Solver
-from tolcontact.simulation import Block
+from tolcontact.simulation import Block, defined_measures
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.variation.draws import Draws
@@ -132,7 +132,7 @@ def _values(
 
 
 def _observed(block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return block.measured.copy(), block.carrying.copy(), block.status.copy()
+    return defined_measures(block), block.carrying.copy(), block.status.copy()
 
 
 def _has_kink(ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray, rounding: np.ndarray) -> np.ndarray:

@@ -105,8 +105,9 @@ class Measure(Declaration):
             return -math.inf if lower is None else lower, math.inf if upper is None else upper
         if isinstance(self.tolerance, Deviations):
             return nominal + self.tolerance.lower, nominal + self.tolerance.upper
-        half = math.inf if self.tolerance is None else self.tolerance / 2
-        return nominal - half, nominal + half
+        if self.tolerance is None:
+            return -math.inf, math.inf
+        return nominal - self.tolerance / 2, nominal + self.tolerance / 2
 
     def faults(self) -> Iterator[str]:
         for point in self.points:

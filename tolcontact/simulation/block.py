@@ -117,7 +117,12 @@ class Block(Record, Readable):
 
 def outcomes(block: Block) -> tuple[Float[Array, "n state measure"], Int[Array, " n"]]:
     """Return copies of measures (n, state, measure) and statuses (n,), so that the block itself can be freed."""
-    return block.measured.copy(), block.status.copy()
+    return defined_measures(block), block.status.copy()
+
+
+def defined_measures(block: Block) -> Float[Array, "n state measure"]:
+    """Return a copy of the measures (n, state, measure) of a block; an infinite value is not a number."""
+    return np.where(np.isfinite(block.measured), block.measured, np.nan)
 
 
 def simulate_block(

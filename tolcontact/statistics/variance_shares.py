@@ -108,8 +108,8 @@ def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) ->
     is_rare = membership @ np.array([effective_count(column**2) < MIN_EFFECTIVE for column in x.T]) > 0
     shares: list[LinearShares | None] = []
     for values in y.T:
-        centred = values - values.mean()
-        if not (np.isfinite(values).all() and (scale := np.abs(centred).max()) > 0):
+        centred = values - values.mean() if np.isfinite(values).all() else np.zeros(n)
+        if not (scale := np.abs(centred).max()) > 0:
             shares.append(None)
             continue
         centred = centred / scale

@@ -94,8 +94,9 @@ def relations_of(results: xr.DataTree, summary: xr.Dataset) -> dict[str, Any]:
 
 
 def _values(rows: xr.Dataset, measure: int) -> list[np.ndarray]:
-    """Return the values (realization,) of a measure in each state."""
-    return [column(rows, terms.MEASURED, state=state, measure=measure) for state in range(len(terms.STATES))]
+    """Return the values (realization,) of a measure in each state; an infinite value is not a number."""
+    states = (column(rows, terms.MEASURED, state=state, measure=measure) for state in range(len(terms.STATES)))
+    return [np.where(np.isfinite(x), x, np.nan) for x in states]
 
 
 def _convergence(x: np.ndarray) -> Packed:
