@@ -1,6 +1,7 @@
 """Measures that are not numbers for some deviations: no answer counts these realizations as good or bad without a word."""
 
 import json
+import re
 
 import casadi
 import numpy as np
@@ -85,6 +86,21 @@ def test_an_infinite_measure_is_no_number_and_numpy_says_nothing_of_it(tmp_path,
     tc.analyses.contributions(model, samples=16)
     tc.analyses.stack_up(model, samples=16)
     assert not [str(warning.message) for warning in recwarn if issubclass(warning.category, RuntimeWarning)]
+
+
+def test_sensitivities_leave_out_what_is_no_number_and_say_of_how_many_realizations(tmp_path):
+    model = block_with(lambda x: 1 / casadi.if_else(x < 0, 0.0, 1 + x))
+    model.measure("never", lambda poses: 1 / (0 * poses.position(model.parts[0].point(0, 0, 0))[0]))
+    tc.run(model, samples=50, surfaces=0, fields="none", out=tmp_path / "block.nc").close()
+    found = tc.analyses.sensitivities(model, samples=100, into=tmp_path / "block.nc").sel(contributor="block.X")
+    count = int(found["not_a_number"].sel(measure="function"))
+    assert 30 < count < 70 and found["not_a_number"].sel(measure=["place", "never"]).values.tolist() == [0, 100]
+    of = found.sel(measure="function", state="corrected")
+    assert np.isnan(of["nominal"]) and float(of["sensitivity"][0]) == pytest.approx(-0.8, abs=0.1) and of["spread"] < 0.2
+    assert np.isnan(found.sel(measure="never")["sensitivity"]).all()
+    text = re.sub(r"\s+", " ", call(tmp_path, "sensitivities", "block.nc", "--samples", "100").stdout)
+    assert f"function: not a number in {count} % of the realizations, or at a step from there; they are left out" in text
+    assert "never: not a number in 100 % of the realizations" in text and "nan" not in text
 
 
 @pytest.mark.parametrize("value", ["casadi.sqrt(-1 - x**2)", "1 / (0 * x)"])

@@ -40,6 +40,8 @@ def sensitivities(
         by_contact   (measure, contact, contributor, interval) mean, corrected, over the other realizations: those untouched
                                                                by contact, and those touched
         step         (contributor)                             a hundredth of its standard deviation, up and down
+        not_a_number (measure)                                 number of realizations in which the measure with contact, there
+                                                               or at a step, is not a number: they are left out
 
     Each contributor is stepped alone, even if it is drawn jointly with others; a shared cause is stepped with the contributors
     that it drives. Where the active set is the same before and after the step, and both sides of the step agree within a tenth
@@ -93,7 +95,7 @@ def _answers(analysis: Analysis, columns: np.ndarray, steps: np.ndarray) -> Iter
     unknown = np.full((len(nominal), 2, len(columns), len(terms.ESTIMATE)), np.nan)
     unknown_values = {
         "sensitivity": unknown, "spread": unknown[..., 0], "by_contact": unknown, "changing": unknown[0, 0],
-        "by_status": np.zeros(len(terms.STATUS_MEANINGS), dtype=int),
+        "not_a_number": np.zeros(len(nominal), dtype=int), "by_status": np.zeros(len(terms.STATUS_MEANINGS), dtype=int),
     }  # fmt: skip
 
     def answer(count: int, results: Results | None = None) -> Answer:
@@ -124,9 +126,10 @@ def _values(
     is_touched = status != terms.Status.UNTOUCHED
     return {
         "sensitivity": np.stack([_means(slopes[:, :, state]) for state in range(len(terms.STATES))], axis=1),
-        "spread": slopes.std(axis=0, ddof=1).transpose(2, 1, 0),
+        "spread": np.ma.masked_invalid(slopes).std(axis=0, ddof=1).filled(np.nan).transpose(2, 1, 0),
         "by_contact": np.stack([_means(smooth[~is_touched]), _means(smooth[is_touched])], axis=1),
         "changing": [intervals.proportion(column) for column in changes.T],
+        "not_a_number": np.isnan(slopes[:, :, terms.CORRECTED]).any(axis=1).sum(axis=0),
         "by_status": np.bincount(status, minlength=len(terms.STATUS_MEANINGS)),
     }
 
@@ -143,7 +146,8 @@ def _has_kink(ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray, roundi
     almost no effect has no kink.
     """
     size = np.maximum(np.abs(ahead), np.abs(behind))
-    typical = np.median(size.max(axis=2), axis=0).T  # (measure, contributor); a jump does not enlarge a median
+    # (measure, contributor), of the values that are numbers; a jump does not enlarge a median.
+    typical = np.ma.median(np.ma.masked_invalid(size.max(axis=2)), axis=0).filled(0.0).T  # type: ignore[no-untyped-call]
     floor = np.maximum(NEGLIGIBLE * np.maximum(nominal, typical).max(axis=1, initial=0), rounding / MAX_DIFFERENCE)
     return np.asarray((np.abs(ahead - behind) > MAX_DIFFERENCE * np.maximum(size, floor[:, None])).any(axis=(2, 3)))
 

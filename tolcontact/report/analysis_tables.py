@@ -12,7 +12,17 @@ from rich.text import Text
 from tolcontact import vocabulary as terms
 from tolcontact.limits import GAP_ACCURACY
 from tolcontact.report import allocation_tables, stack_tables
-from tolcontact.report.table import AnalysisReport, Table, by_measure, grouped, lost_realizations, number, percent, unresolved
+from tolcontact.report.table import (
+    AnalysisReport,
+    Table,
+    by_measure,
+    grouped,
+    lost_realizations,
+    not_a_number,
+    number,
+    percent,
+    unresolved,
+)
 
 BRIEF_TABLES, BRIEF_ROWS = 10, 4  # of a coarse answer in brief: the first tables, and the rows of each that a line has
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
@@ -112,6 +122,7 @@ def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
         "over realizations with contact, both without kinks and jumps;",
         '"all" includes kinks and jumps, and "kinks" is their share.',
         *lost_realizations(unresolved(dataset)),
+        *_left_out(dataset),
     ]
     tables = [_slopes(measure) for measure in by_measure(dataset)]
     leverage = dataset["leverage"].values
@@ -123,6 +134,15 @@ def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
     return AnalysisReport("Sensitivities", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables, main=4)
 
 
+def _left_out(dataset: xr.Dataset) -> Iterator[str]:
+    """Yield a remark on each measurement that is not a number in some realizations."""
+    counts = dataset["not_a_number"].values.tolist() if "not_a_number" in dataset else []  # older archives have none
+    for measure, count in zip(dataset["measure"].values, counts, strict=False):
+        if count:
+            share = not_a_number(count, dataset.attrs["realizations"])
+            yield f"{measure}: {share}, or at a step from there; they are left out"
+
+
 def _slopes(dataset: xr.Dataset) -> Table:
     """Return the derivatives of a measure, starting with the contributors that have the largest effect."""
     mean = np.abs(dataset["sensitivity"].sel(interval="estimate").values).max(axis=0)
@@ -131,7 +151,7 @@ def _slopes(dataset: xr.Dataset) -> Table:
         size = np.abs(dataset["nominal"].values)
     rows = []
     for k in np.argsort(-size * dataset["step"].values, kind="stable"):
-        if not size[k] > SMALL_SLOPE * np.nanmax(size):
+        if not size[k] > SMALL_SLOPE * np.nanmax(size, initial=0.0):
             continue
         slopes = dataset.isel(contributor=int(k))
         means = [slopes["by_contact"].sel(contact=contact).values for contact in terms.CONTACT_STATES]
@@ -139,7 +159,7 @@ def _slopes(dataset: xr.Dataset) -> Table:
         nominal = f"{float(slopes['nominal']):.3g}" if math.isfinite(slopes["nominal"]) else "kink"
         spread, kinks = f"{float(slopes['spread'][terms.CORRECTED]):.2g}", percent(slopes["changing"].values)
         rows.append([str(slopes["contributor"].values), nominal, *map(number, means), spread, kinks])
-    small = dataset.sizes["contributor"] - len(rows)
+    small = int(np.isfinite(size).sum()) - len(rows)
     title = f"{dataset['measure'].values} ({dataset['measure_units'].values} for a unit of each)"
     columns = ["", "nominal", "apart", "touching", "all", "spread", "kinks"]
     return Table(title, columns, rows, [f"and {small} with next to no effect"] if small else [])

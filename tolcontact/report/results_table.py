@@ -9,7 +9,16 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.contact_text import unexplained_offsets
-from tolcontact.report.table import Table, by_measure, grouped, limits_text, nominal_and_limits, number, percent
+from tolcontact.report.table import (
+    Table,
+    by_measure,
+    grouped,
+    limits_text,
+    nominal_and_limits,
+    not_a_number,
+    number,
+    percent,
+)
 from tolcontact.statistics.capability import CONSTANT, FAILS, KEPT, UNDECIDED, Verdict, verdict
 
 PPM_BELOW = 0.01  # if all shares are smaller, the table states them in ppm
@@ -163,11 +172,9 @@ def verdict_lines(summary: xr.Dataset, *, states_once: bool = False) -> Iterator
     """
     doubts = doubts_of_all(summary)
     for measure in by_measure(summary):
-        if share := int(measure[terms.NOT_A_NUMBER].values) / summary.attrs["realizations"]:
-            # A share in percent with two digits, never rounded to 0 or to all.
-            rounded = f"{100 * share:.2g} %" if share < 0.995 else "100 %" if share == 1 else "more than 99 %"
+        if count := int(measure[terms.NOT_A_NUMBER].values):
             lacking = "verdict" if limits_text(measure) else "statistics"
-            yield f"{full_name(measure)}: not a number in {rounded} of the realizations, so it has no {lacking}"
+            yield f"{full_name(measure)}: {not_a_number(count, summary.attrs['realizations'])}, so it has no {lacking}"
         if text := verdict_text(verdict_of(measure, summary.attrs["realizations"])):
             is_about_limits = not text.startswith((UNDECIDED, CONSTANT))
             remarks = f"{_kept(measure)}{'' if states_once else doubts}"

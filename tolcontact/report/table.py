@@ -121,6 +121,13 @@ def lost_realizations(count: int) -> list[str]:
     return [f"{grouped(count)} realizations were not resolved; their last poses are included"] if count else []
 
 
+def not_a_number(count: int, realizations: int) -> str:
+    """Return in which share of the realizations a measurement is not a number: two digits, never rounded to 0 or to all."""
+    share = count / realizations
+    rounded = f"{100 * share:.2g} %" if share < 0.995 else "100 %" if share == 1 else "more than 99 %"
+    return f"not a number in {rounded} of the realizations"
+
+
 def unresolved(dataset: xr.Dataset) -> int:
     """Return the number of realizations that were not resolved."""
     return int(dataset["by_status"].values[list(terms.UNRESOLVED)].sum())

@@ -94,6 +94,7 @@ SENSITIVITIES = AnalysisRecord("sensitivities", "sensitivities of the measuremen
     ),
     variable("f8 changing(contributor, interval) [1]", "share of realizations with a kink or a jump within the step"),
     variable("f8 step(contributor)", "step of the differences, up and down"),
+    variable("i8 not_a_number(measure) [1]", "number of realizations left out: the measure, or a step of it, is not a number"),
     _by_status(),
 ))  # fmt: skip
 WORST_CASE = AnalysisRecord("worst_case", "worst cases of the measurements of {assembly}", (
