@@ -36,7 +36,7 @@ def tails(
         probability  (event, interval)          with its 95 % interval
         disagreement (event)                    ratio of the results of two searches for the event; 1 if they agree
         stop         (event)                    1: many values were at one of the limits, and none beyond; if the other limit
-                                                can be exceeded, this one is left out
+                                                can be exceeded, this one is left out; 0 without a probability
         simulated    (event)                    number of realizations, some of them the same for all events
         by_status    (event, status_meaning)    number of realizations, most of them unlikely ones
 
@@ -81,7 +81,9 @@ def _answers(analysis: Analysis, events: "dict[str, list[Side]]") -> Iterator[Ca
         values = {
             "probability": [tail.probability for tail in tails],
             "disagreement": [tail.disagreement for tail in tails],
-            "stop": np.array([any(side.is_stop for side in sides) for sides in events.values()], dtype=np.int8),
+            "stop": np.array(
+                [any(side.is_stop for side in sides) and not _is_undefined(sides) for sides in events.values()], dtype=np.int8
+            ),
             "simulated": np.sum(by_status, axis=1),
             "by_status": by_status,
         }
@@ -114,12 +116,17 @@ def _tail(sides: "list[Side]") -> Tail:
 
     If the other limit can be exceeded, a limit that acts as a stop would only add its detection bound, so it is left out.
     """
-    if any(side.is_undefined for side in sides):
+    if _is_undefined(sides):
         return Tail(UNDEFINED, 1.0)
     exceedable = [side for side in sides if not side.is_stop] or sides
     counted = [side.hits for side in exceedable if side.searched is None]
     tails = [side.searched for side in exceedable if side.searched is not None]
     return either([*tails, *([Tail(proportion(np.any(counted, axis=0)), 1.0)] if counted else [])])
+
+
+def _is_undefined(sides: "list[Side]") -> bool:
+    """Return whether the measure of an event is not a number where that counts."""
+    return any(side.is_undefined for side in sides)
 
 
 def simulated_scores(analysis: Analysis, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
