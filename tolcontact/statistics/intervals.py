@@ -161,9 +161,11 @@ def root(variance: Estimate, *, times: float = 1.0) -> Estimate:
 def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estimate]:
     """Return percentiles with intervals between order statistics (binomial, distribution-free).
 
-    A bound is infinite if the sample is too small.
+    A bound is infinite if the sample is too small. All are undefined if a value is not finite.
     """
     x = Sample.of(x)
+    if not math.isfinite(x.mean):
+        return [UNDEFINED] * len(percents)
     shares, last = np.array(percents) / 100, x.count - 1
     places = last * shares  # ranks, from 0, of the percentiles and of the bounds of their intervals
     floors = np.floor(places).astype(int)
