@@ -102,6 +102,13 @@ def test_the_first_draws_have_the_results_of_runs_with_the_other_objectives(comp
         assert np.array_equal(kept.status_by_objective, alone.status)
 
 
+@pytest.mark.parametrize(("count", "is_compared"), [(9, False), (10, True)])
+def test_changes_by_objective_are_of_ten_realizations_or_more(count, is_compared, compared):
+    few = compared.copy(deep=True)
+    status = few["objectives"].status_by_objective
+    status[1:, np.flatnonzero(np.isin(status, (0, 1)).all(axis=0))[count:]] = 2  # not converged
+    assert tc.summarize(few).change_by_objective.notnull().any() == is_compared
+
 def test_the_summary_names_the_convention_and_the_means_by_others(compared):
     text = printed(tc.summarize(compared))
     assert "convention: parts move as little as possible, measured where they penetrated" in text
