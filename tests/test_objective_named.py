@@ -110,6 +110,7 @@ def test_changes_by_objective_are_of_ten_realizations_or_more(count, is_compared
     status[:, np.delete(np.arange(status.shape[1]), certified[:count])] = 2  # not converged
     assert tc.summarize(few).change_by_objective.notnull().any() == is_compared
 
+
 def test_the_summary_names_the_convention_and_the_means_by_others(compared):
     text = printed(tc.summarize(compared))
     assert "convention: parts move as little as possible, measured where they penetrated" in text
