@@ -168,7 +168,10 @@ def _doubts(summary: xr.Dataset, doubtful: int, count: int) -> Iterator[str]:
     if in_bodies:
         parts = ", ".join(_clashes_of(summary, is_declared=True))
         yield f"doubtful: in {in_bodies} of {count} answers bodies with declared contact still lie in each other: {parts}"
-        yield "advice: they probably meet beyond the chosen faces; tolcontact check names these, and writes the lines to add"
+        yield (
+            "advice: they probably meet beyond the chosen faces; tolcontact check names these, and writes the lines to add, "
+            "if it sees them among its 128 realizations"
+        )
 
 
 def _clashes(summary: xr.Dataset, count: int, *, is_long: bool = False) -> Iterator[str]:
