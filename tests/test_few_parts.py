@@ -125,6 +125,8 @@ def test_what_few_parts_leave_open_needs_parts_and_no_realizations():
 
     few, many, none = text(3), text(5000), text(0)
     assert "gap: undecided: it is known from few parts, so measure more parts; more realizations decide nothing\n" in few
+    assert "[-] of fewer than 10 measured rows the mean and shares alone have an interval: measure more\n" in few
+    assert "Pp and Ppk need" not in few and "Pp and Ppk need" in none
     assert "measurements include: population 1: a from 3 parts\n" in few and "known from" not in none
     assert all(re.search(r"gap: undecided: about [\d ]+ more realizations\n", printed) for printed in (many, none))
 

@@ -92,7 +92,7 @@ def check_name(path: Path) -> None:
 
 
 def check_ending(path: str | Path) -> None:
-    """Raise ArchiveError unless the path of an archive to write has the extension by which archives are known."""
+    """Raise ArchiveError unless the path of an archive to write has the extension of archives."""
     if not is_archive(path):
         raise ArchiveError(f'"{path}" is not the name of an archive; expected one that ends in .nc')
 

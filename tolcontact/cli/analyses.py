@@ -75,7 +75,7 @@ def _ranges(dataset: "xr.Dataset") -> Any:
 
 
 def _envelopes(dataset: "xr.Dataset") -> Any:
-    """Return the envelopes of a sweep, and beside them the share of realizations that are outside at any position."""
+    """Return the envelopes of a sweep, with the share of realizations that are outside at any position."""
     shares = dataset["outside"].to_series().unstack(terms.INTERVAL).add_prefix("outside ")
     return _intervals("envelope")(dataset).join(shares)
 

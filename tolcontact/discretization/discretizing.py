@@ -183,8 +183,8 @@ def _repeated_labels(labels: Sequence[str]) -> Iterator[str]:
 def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[str], unsure: Sequence[str]) -> Iterator[str]:
     """Yield references to unknown contributors, or to `shifts` that follow from others, and contributors drawn twice.
 
-    Beside other faults `labels` are not all: what may be a contributor of the `unsure` parts and joints is left out, and so are
-    the faults of known contributors.
+    If there are other faults, `labels` are incomplete: what may be a contributor of the `unsure` parts and joints is left out,
+    and so are the faults of known contributors.
     """
     recognized, variables = set(labels), {variable.name for variable in assembly.variables}
     sources, of_unsure = dict[str, str](), tuple(f"{name}." for name in unsure)

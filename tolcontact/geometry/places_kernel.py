@@ -97,7 +97,7 @@ def _is_over_plane(candidates, plane, body, x, slack):  # type: ignore[no-untype
 
 @inlined_uncounted
 def _owner(A, B, candidates, s, X):  # type: ignore[no-untyped-def]
-    """Return the corner or edge to which candidate s belongs, at a pose: its start and its vector, which a corner lacks.
+    """Return the start and the vector of the corner or edge of candidate s at a pose; a corner has no vector.
 
     They are in the frame of the body that it may touch.
     """

@@ -293,7 +293,7 @@ def _passes_listed(side, f, p, q, start, end, shares, senses):  # type: ignore[n
 
 @uncounted
 def _passes_any(owner, target, X, is_forward, motion, deviation, shares, senses):  # type: ignore[no-untyped-def]
-    """Return whether an edge of a body passes the surface of the other one; pose and deviations move points by [mm] at most."""
+    """Return whether an edge passes the surface of the other body; `motion` and `deviation` bound how far points move [mm]."""
     motion += deviation
     is_listed = motion <= owner.reach
     for j in range(near_count(owner.distances, motion)):

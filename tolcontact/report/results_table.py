@@ -93,7 +93,7 @@ def result_rows(summary: xr.Dataset) -> list[ResultRow]:
                 full_name(measure),
                 str(measure["measure_units"].values),
                 str(measure["measure_quantity"].values),
-                f"{verdict_text(opinion)}{kept}{doubts}" if opinion else "",
+                f"{verdict_text(opinion)}{kept}{doubts}" if opinion else _lack(measure, summary.attrs["realizations"]),
                 None if is_open or opinion is None else opinion.word != FAILS,
                 nominal,
                 lower,
@@ -130,6 +130,12 @@ def verdict_text(opinion: Verdict | None) -> str:
         return f"{UNDECIDED}: it is known from few parts, so measure more parts; more realizations decide nothing"
     digits = DIGITS_OF_COUNTS - len(str(int(opinion.more)))
     return f"{UNDECIDED}: about {grouped(int(round(opinion.more, min(digits, 0))))} more realizations"
+
+
+def _lack(measure: xr.Dataset, realizations: int) -> str:
+    """Return why a measurement with limits has no verdict; "" for one without limits."""
+    count = int(measure[terms.NOT_A_NUMBER].values)
+    return not_a_number(count, realizations) if count and limits_text(measure) else ""
 
 
 def reservation(summary: xr.Dataset) -> str:

@@ -16,6 +16,7 @@ from tolcontact.report.contact_text import CORRECTED, RAW, contact_lines, offset
 from tolcontact.report.results_table import full_name, overview_table, verdict_lines, verdict_of
 from tolcontact.report.table import NO_INTERVAL, Table, by_measure, grouped, limits_text, number, percent, share
 from tolcontact.statistics.capability import CONSTANT, FAILS, MEETS, MIN_TAIL, MIN_TAILS, UNDECIDED
+from tolcontact.statistics.few_parts import MIN_ROWS
 from tolcontact.statistics.intervals import CONFIDENCE, MAX_KURTOSIS, MIN_SHAPE, MIN_VARIANCE
 from tolcontact.statistics.sample import MIN_APART
 
@@ -160,7 +161,10 @@ def measure_table(measure: xr.Dataset, measures: int) -> Table:
 
 
 def _needs(measure: xr.Dataset) -> Iterator[str]:
-    """Yield from how many realizations on the statistics of a measurement that have no interval would have one."""
+    """Yield from how many realizations or measured rows on the statistics of a measurement without an interval have one."""
+    if measure[terms.FEW_ROWS]:
+        yield f"{NO_INTERVAL} of fewer than {MIN_ROWS} measured rows the mean and shares alone have an interval: measure more"
+        return
     if required := int(measure[terms.REQUIRED].values):
         yield f"{NO_INTERVAL} at a stop, moments need {MIN_APART} values off it: about {grouped(required)} realizations"
     for statistic in measure["statistic"].values:

@@ -122,7 +122,7 @@ class Worlds:
     def stretch(self, index: "Index", name: str) -> float:
         """Return how many times wider the interval of a statistic or change is than its spread over the worlds.
 
-        Without measured rows it is 1; of few rows a mean alone has an interval, and it is NaN for others.
+        It is 1 without measured rows, and NaN for what has no interval: of few rows all but the mean.
         """
         if math.isinf(n := self.fewest(index)):
             return 1.0
@@ -238,7 +238,7 @@ def with_few_parts(
             ratio = corrected[:, NAMES.index(terms.SIX_SIGMA)] / raw[:, NAMES.index(terms.SIX_SIGMA)]
             of_change = {terms.SHIFT: corrected[:, 0] - raw[:, 0], terms.SPREAD_RATIO: ratio, terms.VARIANCE_RATIO: ratio**2}
             for estimate, name in zip(changes[number], terms.CHANGES, strict=True):
-                stretch = max(worlds.stretch(index, name) for index in indices)
+                stretch = float(np.max([worlds.stretch(index, name) for index in indices]))  # NaN if one is
                 estimate[1:] = _joined(estimate, of_change[name], stretch, is_positive=name != terms.SHIFT)
     return statistics, changes
 
@@ -266,8 +266,10 @@ def widened(
 def _joined(estimate: np.ndarray, drawn: np.ndarray, stretch: float, *, is_positive: bool) -> np.ndarray:
     """Return the bounds of an estimate (value, lower, upper), with draws (world,) as an independent error on either side.
 
-    stretch   by how much the draws spread too little about it
+    stretch   how many times wider the interval is than the spread of the draws; NaN: there is no interval
     """
+    if math.isnan(stretch):
+        return np.full(2, np.nan)
     drawn = drawn[np.isfinite(drawn)]
     if not (len(drawn) and np.isfinite(estimate).all()) or (is_positive and not (estimate[1] > 0 and drawn.min() > 0)):
         return estimate[1:]

@@ -95,6 +95,7 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
     if worlds := worlds_of(results, count):
         statistics, changes = with_few_parts(rows, worlds, statistics, changes)
     notes[terms.OPEN_BY_PARTS] = _are_open_by_parts(by_realizations, statistics)
+    notes[terms.FEW_ROWS] = _have_few_rows(statistics)
     rigid, (clashes, clash_names) = _is_rigid(results), contact.clashes(rows)
     values = {
         terms.STATISTIC_VALUE: statistics,
@@ -156,6 +157,12 @@ def _are_open_by_parts(by_realizations: np.ndarray, statistics: np.ndarray) -> n
         for values in (by_realizations, statistics)
     )
     return (after > 2 * before).astype(np.int64)
+
+
+def _have_few_rows(statistics: np.ndarray) -> np.ndarray:
+    """Return whether the median of a measure (measure,) has no bounds in either state: few realizations leave infinite ones."""
+    medians = statistics[:, :, list(STATISTICS).index("50 %")]
+    return (np.isfinite(medians[..., 0]) & np.isnan(medians[..., 1])).any(axis=1).astype(np.int64)
 
 
 def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:

@@ -23,6 +23,7 @@ def test_an_index_differs_from_its_counterpart_with_95_of_100_confidence_for_all
         "measure_lower": np.nan,
         "measure_upper": 4.5,
         "measure_required": 0,
+        "measure_few_rows": 0,
     }
     marked = [
         any("*" in cell for row in measure_table(xr.Dataset(

@@ -83,6 +83,11 @@ def test_each_measurement_has_a_row_with_its_verdict():
     assert [rows[name].is_good for name in names] == [True, False, None]
     assert rows["wide"].limits == ("0", "-100", "100") and rows["open"].limits == ("0", "", "")
     assert [figures.state for figures in rows["wide"].states] == ["with contact", "without contact"]
+    undefined = summary.copy(deep=True)
+    undefined["statistic_value"][:] = np.nan
+    undefined["measure_not_a_number"][:] = 250
+    verdicts = {row.name: row.verdict for row in result_rows(undefined)}
+    assert (verdicts["wide"], verdicts["open"]) == ("not a number in 12 % of the realizations", "")
     lines = list(verdict_lines(summary))
     assert "wide: meets its limits" in lines and not [line for line in lines if line.startswith("open")]
 
