@@ -23,4 +23,20 @@ def test_a_run_imports_what_it_needs(tmp_path):
     call(tmp_path, "new", "small")
     modules = imported(tmp_path, "run", "small.py", "--samples", "20")
     assert "casadi" in modules
-    assert not {"distributed.client", "jaxtyping", "tolcontact.analyses", "tolcontact.pmi", "tolcontact.report.html"} & modules
+    assert (
+        not {
+            "distributed.client",
+            "jaxtyping",
+            "scipy.stats",
+            "tolcontact.analyses",
+            "tolcontact.pmi",
+            "tolcontact.report.html",
+        }
+        & modules
+    )
+
+
+def test_a_summary_imports_nothing_that_simulates(archive):
+    modules = imported(archive.parent, "summary", archive.name)
+    assert "xarray" in modules
+    assert not {"casadi", "numba", "trimesh", "scipy.spatial", "scipy.stats", "tolcontact.declaration.assembly"} & modules

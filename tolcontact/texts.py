@@ -54,3 +54,11 @@ def literal(value: Any) -> str:
         return "None"
     written = json.dumps(value, ensure_ascii=False)
     return re.sub("[\ud800-\udfff\u2028\u2029\x7f-\x9f]", lambda match: f"\\u{ord(match[0]):04x}", written)
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words."""
+    for size, unit in ((86_400, "days"), (3600, "h"), (60, "min")):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s"

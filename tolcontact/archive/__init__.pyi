@@ -1,8 +1,6 @@
 from .journal import locked_archive as locked_archive
 from .reader import (
     check_rows as check_rows,
-    method_of_run as method_of_run,
-    model_of as model_of,
     open_archive as open_archive,
     open_unchecked as open_unchecked,
     opened as opened,
@@ -15,6 +13,7 @@ from .rows import (
     size_in_words as size_in_words,
 )
 from .settings import Run as Run, run_settings as run_settings
+from .stored_model import method_of_run as method_of_run, model_of as model_of
 from .variables import labelled as labelled, sizes_of_rows as sizes_of_rows
 from .writer import (
     ArchiveWriter as ArchiveWriter,

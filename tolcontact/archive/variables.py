@@ -1,52 +1,21 @@
-"""Variables of the vocabulary in netCDF files: their definition, and the labels, sizes and units of realizations.
+"""Variables of the vocabulary in netCDF files: their definition, and the labels, sizes and units of realizations."""
 
-Only one thread may use the netCDF library at a time.
-"""
-
-import contextlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import Any, Literal
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import netCDF4
 import numpy as np
 import pandas as pd
 import xarray as xr
-from xarray.backends import NetCDF4DataStore
 
 from tolcontact import vocabulary as terms
 from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
-from tolcontact.system import files
 from tolcontact.vocabulary import ArchiveVariable
 
-CACHE_BYTES = 1 << 20  # a chunk of most variables; with the usual size, all caches would take as much memory as all else
 MAX_CHUNK_BYTES = 1 << 22  # bytes: more would not stay in the library's cache
 MIN_CHUNK_ROWS = 16
-
-
-with netCDF4.Dataset("in memory", "w", diskless=True) as _file:
-    XARRAY_LOCK = NetCDF4DataStore(_file).lock  # type: ignore[no-untyped-call]  # held while xarray uses the library
-
-
-@contextlib.contextmanager
-def open_netcdf(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
-    """Open a file whose values are read and written as they are, without masks. Meanwhile xarray uses no netCDF file."""
-    with XARRAY_LOCK, small_caches(), netCDF4.Dataset(files.plain_path(path), mode, format="NETCDF4") as file:
-        file.set_auto_maskandscale(False)
-        yield file
-
-
-@contextlib.contextmanager
-def small_caches() -> Iterator[None]:
-    """Give each variable of a file that is opened meanwhile a small cache."""
-    usual = netCDF4.get_chunk_cache()
-    try:
-        netCDF4.set_chunk_cache(CACHE_BYTES)
-        yield
-    finally:
-        netCDF4.set_chunk_cache(*usual)
 
 
 def define(

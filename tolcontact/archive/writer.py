@@ -15,11 +15,12 @@ from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.archive.header import empty_checks, write_header
 from tolcontact.archive.inspection import check_archive, check_ending, inspect
 from tolcontact.archive.journal import Checkpoint, Journal, locked_archive
+from tolcontact.archive.netcdf_files import open_netcdf
 from tolcontact.archive.reader import check_rows, open_unchecked
 from tolcontact.archive.rows import check_room, kept_rows
 from tolcontact.archive.same_model import check_same_model, check_same_run
 from tolcontact.archive.settings import Run, now, run_settings, versions
-from tolcontact.archive.variables import open_netcdf, overwrite
+from tolcontact.archive.variables import overwrite
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
 from tolcontact.replacing import replacing

@@ -14,8 +14,7 @@ from rich.console import Console
 
 from tolcontact import report
 from tolcontact.cli.app import echo
-from tolcontact.declaration import Assembly, TitleBlock
-from tolcontact.declaration.script import load_model
+from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.errors import OptionError
 from tolcontact.replacing import check_identities, folder_fault
 from tolcontact.texts import csv_cell
@@ -123,11 +122,3 @@ def note_kept_title(archive: Path | None, entries: Mapping[str, str | None]) -> 
             f"tolcontact report {archive} --title ...",
             err=True,
         )
-
-
-def titled_model(path: Path, entries: Mapping[str, str | None]) -> Assembly:
-    """Return the assembly that a file declares, with its title block updated by the `entries` that are not None."""
-    assembly = load_model(path)
-    if any(entry is not None for entry in entries.values()):
-        assembly.title_block = (assembly.title_block or TitleBlock()).overridden(entries)
-    return assembly

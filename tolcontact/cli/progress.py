@@ -15,8 +15,7 @@ from rich.table import Column
 from tolcontact import interrupts
 from tolcontact.cli.app import echo
 from tolcontact.report.table import grouped
-from tolcontact.texts import shown
-from tolcontact.workflow.forecast import duration
+from tolcontact.texts import duration, shown
 
 LINE_INTERVAL = 10.0  # s
 LONG_WAIT = 300.0  # s remaining, above which advice is given

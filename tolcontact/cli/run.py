@@ -2,6 +2,7 @@
 
 import functools
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +14,8 @@ from tolcontact import report as reports
 from tolcontact.archive import Run, open_unchecked
 from tolcontact.cli import app as common, output
 from tolcontact.cli.progress import shown_progress, stopped
+from tolcontact.declaration import Assembly, TitleBlock
+from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError
 from tolcontact.realizations import archived_analysis
 from tolcontact.simulation.cluster import client_of
@@ -92,7 +95,7 @@ def run(
             show(*done)
 
         path = write_run(
-            functools.partial(output.titled_model, model, titles),
+            functools.partial(_titled_model, model, titles),
             Run(seed, samples, keep, surfaces, int(fields) if re.fullmatch(r"[0-9]{1,18}", fields) else fields, plan),
             out or folder / "results.nc", solver=solver, method=method, overwrite=overwrite and out is not None,
             resume=resume, until=until, client=client, progress=progress,
@@ -144,3 +147,11 @@ def _print_results(summary: Summary, stack: Dataset | None, out: Path | None, sh
     output.check_verdicts(summary)
     if shortfall:
         raise typer.Exit(1)
+
+
+def _titled_model(path: Path, entries: Mapping[str, str | None]) -> Assembly:
+    """Return the assembly that a file declares, with its title block updated by the `entries` that are not None."""
+    assembly = load_model(path)
+    if any(entry is not None for entry in entries.values()):
+        assembly.title_block = (assembly.title_block or TitleBlock()).overridden(entries)
+    return assembly

@@ -10,6 +10,7 @@ from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import block_rows, simulate_blocks
 from tolcontact.system.machine import machine_memory, peak_memory
+from tolcontact.texts import duration
 from tolcontact.vocabulary import BLOCK_ROWS
 
 log = logging.getLogger(__name__)
@@ -83,11 +84,3 @@ def _seconds_per_realization(program: Program, samples: int, seed: int) -> float
         if is_quick or seconds > MIN_TRIAL_SECONDS or trial >= block_rows(program):
             return seconds / trial
         trial *= 8
-
-
-def duration(seconds: float) -> str:
-    """Return a time in words."""
-    for size, unit in ((86_400, "days"), (3600, "h"), (60, "min")):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.0f} {unit}"
-    return f"{seconds:.0f} s"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tolcontact.archive.variables import open_netcdf
+from tolcontact.archive.netcdf_files import open_netcdf
 from tolcontact.archive.writer import choose
 
 
