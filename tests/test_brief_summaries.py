@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 import tolcontact as tc
-from tests.helpers import call
+from tests.helpers import call, compiled
 from tolcontact.report import summary_text
 
 COUNT = 9
@@ -65,6 +65,22 @@ def test_undecided_measurements_and_those_that_are_no_numbers_are_not_hidden():
     a.measure("root", lambda poses: ca.sqrt(poses.position(a.parts[1].point(5, 5, 10))[0] - 5))
     text = printed(tc.summarize(tc.run(a, samples=20, seed=1)))[1]
     assert "root: not a number" in text and "place 0" not in text and f"{COUNT + 1} more without limits" in text
+
+
+def test_what_is_no_number_is_not_among_what_falls_short():
+    """Seven measurements fail, one is never a number: it is shown, or counted on its own where there are many such."""
+    a = many_parts()
+    top = a.parts[1].point(5, 5, 10)
+    for k in range(7):
+        a.measure(f"place {k}", a.parts[1].point(k, 0, 0), along="z", limits=(-1e-4, 1e-4))
+    a.measure("root 0", lambda poses: ca.sqrt(-poses.position(top)[2]), limits=(0, 1))
+    program = compiled(a, solver="daqp")
+    text = printed(tc.summarize(tc.run(program, samples=40, seed=1, surfaces=0)))[1]
+    assert "root 0: not a number" in text and "2 more fall short, too" in text
+    for k in range(1, 8):
+        a.measure(f"root {k}", lambda poses: ca.sqrt(-poses.position(top)[2]), limits=(0, 1))
+    text = printed(tc.summarize(tc.run(compiled(a, solver="daqp"), samples=40, seed=1, surfaces=0)))[1]
+    assert "2 more not a number in some realizations, 7 more fall short, too" in text
 
 
 @pytest.mark.parametrize("width", [100, 80])

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
+from tests.helpers import ROOT, call
 from tests.pmi_records import Annotated
 from tests.test_cad import COVER
 from tolcontact.discretization import discretize
@@ -336,3 +337,16 @@ def test_a_part_without_pmi_gets_one_message(tmp_path):
         with pytest.raises(OptionError) as refused:
             tc.io.features_from_pmi(model.part(message.split('"')[1], geometry))
         assert message in str(refused.value) and str(refused.value).count("\n") == 0
+
+
+def test_the_script_of_a_drawing_with_an_option_runs(tmp_path):
+    """A tangent plane is an option that is true or false."""
+    text = (ROOT / "tolcontact" / "guide" / "files" / "cover_pmi.stp").read_text()
+    profile = "SURFACE_PROFILE_TOLERANCE()GEOMETRIC_TOLERANCE_WITH_DATUM_REFERENCE((#90036))"
+    tangent = "GEOMETRIC_TOLERANCE_WITH_DATUM_REFERENCE((#90036))GEOMETRIC_TOLERANCE_WITH_MODIFIERS((.TANGENT_PLANE.))"
+    text = text.replace(profile, f"{tangent}PERPENDICULARITY_TOLERANCE()")
+    (tmp_path / "tangent.stp").write_text(text)
+    script = call(tmp_path, "pmi", "tangent.stp", "--script").stdout
+    assert "tangent=True" in script
+    (tmp_path / "tangent.py").write_text(script)
+    assert "NameError" not in call(tmp_path, "check", "tangent.py").stderr

@@ -80,6 +80,14 @@ def test_a_journal_that_was_damaged_is_refused_and_left_alone(program, tmp_path)
         with pytest.raises(ArchiveError, match=r'is damaged: it has realizations .* delete "\.killed\.nc\.rows" and'):
             tc.run(program, samples=8000, seed=3, out=path, resume=True)
         assert {file.name: file.read_bytes() for file in (path, rows, checkpoint) if file.exists()} == before
+    rows.write_bytes(whole)
+    checkpoint.write_bytes(state)
+    renamed = path.rename(path.with_name("renamed.nc"))
+    with pytest.raises(
+        ArchiveError, match=r'was named "killed\.nc" .* rename "\.killed\.nc\.rows" to "\.renamed\.nc\.rows" and'
+    ):
+        tc.run(program, samples=8000, seed=3, out=renamed, resume=True)
+    renamed.rename(path)
     for file in (rows, checkpoint):
         file.unlink()
     with tc.run(program, samples=200, seed=3, out=path, resume=True) as results:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases import STILL, Frame
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tolcontact.testing import assert_gaps_recompute
 
 TURNED = Frame(turn=(0.5, -0.7, 1.1), shift=(100, -50, 7))
@@ -234,3 +234,23 @@ def test_a_stack_that_adds_up_is_silent(declared):
 @pytest.mark.parametrize(("declared", "sentence"), TOLD, ids=str)
 def test_a_declaration_by_which_a_tolerance_has_no_effect_is_told(declared, sentence):
     assert any(re.search(sentence, text) for text in effects(block_on_a_block(**declared)))
+
+
+@pytest.mark.parametrize("rotation", [(0.0, 0.0, 0.0), (0.4, -0.9, 0.2)])
+def test_planes_far_apart_tilt_about_their_own_middles(rotation):
+    """In the middle of its faces a long tab has its size, and nothing there slides along the faces."""
+    a = tc.Assembly("tab")
+    tab = a.part("tab", tc.Box(80, 40, 10), rotation=rotation, fixed=True)
+    tab.feature("A", tab.face("-z"), datum="A")
+    length = tab.feature("length", tab.face("-x"), tab.face("+x"), tc.Size(80, 0.1, -0.1), tc.Perpendicularity(0.2, "A"))
+    R = Rotation.from_rotvec(rotation).as_matrix()
+    ends = [length.point(x, 20, 5) for x in (0, 80)]
+    a.measure("size", ends[0], to=ends[1], along=tuple(R[:, 0]), absolute=False)
+    a.measure("slide", ends[1], along=tuple(R[:, 2]))
+    a.measure("tilt", length.point(80, 20, 5), to=length.point(80, 20, 10), along=tuple(R[:, 0]), absolute=False)
+    run = tc.run(compiled(a, solver="daqp"), samples=200, surfaces=0, fields="none")
+    size, slide, tilt = run.measured.sel(state="corrected").values.T
+    drawn = run["sample"].deviation.sel(contributor="tab.length.size").values
+    assert size == pytest.approx(drawn, abs=1e-12) and np.ptp(drawn) > 0.1
+    assert slide == pytest.approx(0.0, abs=1e-12)
+    assert 0.1 < np.ptp(tilt) < 0.25  # of points 5 mm apart, in a zone of 0.2 over 10 mm

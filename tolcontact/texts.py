@@ -46,12 +46,12 @@ def csv_cell(value: Any) -> Any:
 
 
 def literal(value: Any) -> str:
-    """Return a text, a number or None as Python reads it, texts in double quotes.
+    """Return a text, a number, a truth value or None as Python reads it, texts in double quotes.
 
     Python reads what JSON escapes. Surrogates, which no encoding can write, are escaped as well.
     """
-    if value is None:
-        return "None"
+    if value is None or isinstance(value, bool):
+        return str(value)
     written = json.dumps(value, ensure_ascii=False)
     return re.sub("[\ud800-\udfff\u2028\u2029\x7f-\x9f]", lambda match: f"\\u{ord(match[0]):04x}", written)
 

@@ -8,6 +8,7 @@ what it reads.
 import json
 import math
 import os
+import shlex
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -104,7 +105,7 @@ class DamagedError(Exception):
 def check_archive(path: Path) -> None:
     """Raise ArchiveError if there is no file at a path, or it fails the inspection."""
     if fault := fault_of(path):
-        raise ArchiveError(f'archive "{path}" {fault}; write one with: tolcontact run MODEL.py --out {path}')
+        raise ArchiveError(f'archive "{path}" {fault}; write one with: tolcontact run MODEL.py --out {shlex.quote(str(path))}')
     inspect(path)
 
 

@@ -30,6 +30,9 @@ WRITTEN_BYTES = 1 << 24  # that the netCDF library writes together; each call ta
 LONGEST_SUFFIX = f".checkpoint.{'0' * 8}.part"  # of the working files of a run
 
 
+UNREADABLE = OSError, EOFError, RuntimeError, ValueError, KeyError, zipfile.BadZipFile
+
+
 class Checkpoint(NamedTuple):
     """A state of a run that a killed run resumes from.
 
@@ -85,14 +88,28 @@ class Journal:
                 rows, size, checksum, samples = map(int, numbers)
                 sums = [file[f"arr_{number}"] for number in range(len(file.files) - 1)]
         except FileNotFoundError:
+            self._check_not_renamed(archive)
             return None
-        except (OSError, EOFError, RuntimeError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        except UNREADABLE as error:
             raise self._damaged(self._checkpoint) from error
         if of_archive != archive:
             return None
         if self._checksum(size) != checksum:
             raise self._damaged(self._rows)
         return Checkpoint(archive, rows, size, checksum, samples, sums)
+
+    def _check_not_renamed(self, archive: str) -> None:
+        """Raise ArchiveError if the journal of the archive of that history has the name of a file that is gone."""
+        for other in self._checkpoint.parent.glob(".*.checkpoint"):
+            former, history = other.name.removeprefix(".").removesuffix(".checkpoint"), None
+            with contextlib.suppress(*UNREADABLE), np.load(other) as file:
+                history = str(file["state"][0])
+            if history == archive and not other.with_name(former).exists():
+                raise ArchiveError(
+                    f'the archive was named "{former}" when its run was killed; rename ".{former}.rows" to '
+                    f'"{self._rows.name}" and "{other.name}" to "{self._checkpoint.name}", which hold realizations '
+                    "that are not in the archive yet, or delete them, and resume"
+                )
 
     def _checksum(self, size: int) -> int | None:
         """Return the CRC-32 of the first `size` bytes of the journal; None if it does not have as many."""
@@ -187,14 +204,14 @@ def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
 
 
 def _check_replaceable(path: str | Path, real: Path, *, is_allowed: bool) -> None:
+    with real.open("rb") as file:  # netCDF files begin like this, or are empty
+        is_netcdf = file.read(8).startswith((b"\x89HDF\r\n\x1a\n", b"CDF\1", b"CDF\2", b"CDF\5")) or not real.stat().st_size
+    if not is_netcdf:
+        raise ArchiveError(f'"{path}" is no netCDF file, and only these are replaced; choose another name, or remove it first')
     if not is_allowed:
         raise ArchiveError(
             f'archive "{path}" exists; choose another name, replace it (--overwrite, overwrite=True) or continue it '
             "(--resume, resume=True)"
         )
-    with real.open("rb") as file:  # netCDF files begin like this, or are empty
-        is_netcdf = file.read(8).startswith((b"\x89HDF\r\n\x1a\n", b"CDF\1", b"CDF\2", b"CDF\5")) or not real.stat().st_size
-    if not is_netcdf:
-        raise ArchiveError(f'"{path}" is no netCDF file, and only these are replaced; choose another name, or remove it first')
     if not os.access(real, os.W_OK):
         raise ArchiveError(f'archive "{path}" cannot be written: it is read-only')

@@ -150,7 +150,7 @@ Objective = Annotated[
 AsJson = Annotated[bool, flag("--json", "Print the result as JSON.")]
 AsCsv = Annotated[bool, flag("--csv", "Print the estimates as CSV.")]
 Into = Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also store the result in an archive of the same model.")]
-Overwrite = Annotated[bool, flag("--overwrite", "Replace existing archives, pages and spreadsheets, whoever wrote them.")]
+Overwrite = Annotated[bool, flag("--overwrite", "Replace existing netCDF files, pages and spreadsheets, whoever wrote them.")]
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Number of worker processes (with dask).")]
 Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786.")

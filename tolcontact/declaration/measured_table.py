@@ -179,7 +179,11 @@ def _columns(
         matching = [k for k, (short, _) in enumerate(stated) if heading[k] == name or short == name]
         if not matching or not name.strip():
             listed = ", ".join(map(shown, heading))
-            fault = f"has no column {name!r}; its columns are: {listed}" if name else "has a column without a name; name it"
+            fault = (
+                f"has no column {name!r}; its columns are: {listed}"
+                if name
+                else "has a column without a name; name it, or choose columns={label: column}"
+            )
             raise ValueError(f'population "{title}" {fault}')
         if len(matching) > 1:
             places = " and ".join(str(k + 1) for k in matching)

@@ -86,6 +86,10 @@ class FeatureOfSize(FeatureGeometry):
         """Return how a face moves (3,) and grows out of the material as the size grows by 1; `moving`: the faces that do."""
         return np.zeros(3), -0.5 if self.is_inner else 0.5
 
+    def middle(self, face: int) -> np.ndarray:
+        """Return the point (3,) about which a face tilts."""
+        return self.centre
+
 
 @dataclass(frozen=True, eq=False)
 class PlaneFeature(FeatureGeometry):
@@ -126,7 +130,15 @@ class SlabFeature(PlaneFeature, FeatureOfSize):
 
     def growth(self, face: int, moving: Sequence[bool]) -> tuple[np.ndarray, float]:
         """Return how a face moves (3,) along its normal as the size grows by 1; it has no height of its own."""
-        return (-1.0 if self.is_inner else 1.0) * moving[face] / sum(moving) * self.normals[face], 0.0
+        return self._outward(face) * moving[face] / sum(moving), 0.0
+
+    def middle(self, face: int) -> np.ndarray:
+        """Return the point (3,) about which a face tilts: its own middle, or tilted faces would slide in their planes."""
+        return self.centre + self._outward(face) * self.size / 2
+
+    def _outward(self, face: int) -> np.ndarray:
+        """Return the direction (3,) in which a face moves as the size grows."""
+        return -self.normals[face] if self.is_inner else self.normals[face]
 
 
 @dataclass(frozen=True, eq=False)

@@ -188,16 +188,19 @@ class NominalFeature:
         """Return how a face deviates in a part at `placement`; with `index` None the centre, which no size moves."""
         geometry, size_column = self.geometry, self.size_column
         twist, height = geometry.twists @ self.coordinates, np.zeros(self.coordinates.shape[1])
-        if size_column is not None and index is not None and isinstance(geometry, FeatureOfSize):
-            motion, height[size_column] = geometry.growth(index, moving_faces(self.feature))
-            twist[:3, size_column] += motion
+        centre = geometry.centre
+        if index is not None and isinstance(geometry, FeatureOfSize):
+            centre = geometry.middle(index)
+            if size_column is not None:
+                motion, height[size_column] = geometry.growth(index, moving_faces(self.feature))
+                twist[:3, size_column] += motion
         displacing, (R, t) = np.flatnonzero(twist.any(axis=0) | (height != 0)), placement
         form = self.form if index is not None else None
         columns = np.array([*displacing, *(self.form_columns if form else ())], dtype=int)
         return FaceDeviation(
             name=self.label,
             columns=columns,
-            centre=R @ geometry.centre + t,
+            centre=R @ centre + t,
             twist=placed_twist(twist[:, columns], R),
             height=height[columns],
             form=form and form.placed(R, t),

@@ -22,7 +22,8 @@ from tolcontact.statistics.sample import MIN_APART
 
 MOST_DETAILED, MOST_LISTED = 3, 6  # measurements with all their figures; measurements, parts or pairs in a table
 EVERYTHING = "the page has all, and so has tolcontact summary --all"
-URGENCY = {FAILS: 2.0, UNDECIDED: 1.0, "": 0.0, CONSTANT: -1.0, MEETS: -1.0}
+NO_NUMBER = "not a number"
+URGENCY = {NO_NUMBER: 3.0, FAILS: 2.0, UNDECIDED: 1.0, "": 0.0, CONSTANT: -1.0, MEETS: -1.0}
 MOST_IN_LINE = 2  # parts or pairs, in a line of a long summary
 CHANGES_NOTE = "Changes are from the same draws.\n"
 CHANGE_OF_STATISTIC = {"mean": terms.SHIFT, "6 sigma": terms.SPREAD_RATIO, "variance": terms.VARIANCE_RATIO}
@@ -88,8 +89,8 @@ def _sections(summary: xr.Dataset, *, is_whole: bool) -> Iterator[Text | Table |
 def _brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
     """Return the summary of the measurements that fall short of their limits, and a remark about all others.
 
-    All measurements are kept if there are few. One that is not a number in some realizations falls short. If none does, the
-    first ones are kept.
+    All measurements are kept if there are few. Those that are not a number in some realizations come first. If none falls
+    short, the first ones are kept.
     """
     count = summary.sizes[terms.MEASURE]
     if count <= MOST_LISTED:
@@ -97,16 +98,17 @@ def _brief_measures(summary: xr.Dataset) -> tuple[xr.Dataset, str]:
     measures = by_measure(summary)
     opinions = [verdict_of(measure, summary.attrs["realizations"]) for measure in measures]
     verdicts = [
-        FAILS if int(measure[terms.NOT_A_NUMBER].values) else "" if opinion is None else opinion.word
+        NO_NUMBER if int(measure[terms.NOT_A_NUMBER].values) else "" if opinion is None else opinion.word
         for measure, opinion in zip(measures, opinions, strict=True)
     ]
     shares = [float(m["statistic_value"].sel(state=CORRECTED, statistic=terms.OUTSIDE)[0]) for m in measures]
     urgencies = [URGENCY[verdict] + float(np.nan_to_num(share)) / 2 for verdict, share in zip(verdicts, shares, strict=True)]
     largest = np.argsort(-np.array(urgencies), kind="stable")[:MOST_LISTED]
-    failing = [index for index in sorted(largest.tolist()) if verdicts[index] in (FAILS, UNDECIDED)]
+    failing = [index for index in sorted(largest.tolist()) if verdicts[index] in (NO_NUMBER, FAILS, UNDECIDED)]
     selection = failing or list(range(MOST_LISTED))
     remainder = [verdict for index, verdict in enumerate(verdicts) if index not in selection]
     phrases = {
+        "not a number in some realizations": (NO_NUMBER,),
         "fall short, too": (FAILS,),
         "undecided": (UNDECIDED,),
         "without limits": ("",),
