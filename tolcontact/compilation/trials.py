@@ -156,7 +156,7 @@ def _error_of_planes(
     room = max(room, float(np.ptp(fixed)))  # poses that are rarer than in the trial may be deeper by this range
 
     def compared(rows: slice) -> float:
-        bounded = raised_places(pair, pair_meeting, X_RM[rows], deviations[rows]).gaps.min(axis=1, initial=np.inf)
+        bounded = raised_places(pair, pair_meeting, X_RM[rows], deviations[rows]).actual_gaps.min(axis=1, initial=np.inf)
         differences = np.minimum(bounded, room) - np.minimum(fixed[rows], room)
         return float(np.abs(differences).max(initial=0))
 

@@ -8,9 +8,9 @@ from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
 from tolcontact.compilation import Program
-from tolcontact.contact.bounded_scan import BoundedScan, SearchedPlaces
+from tolcontact.contact.bounded_scan import BoundedScan
 from tolcontact.contact.fixed_search import Carriers, FixedSearch, Search
-from tolcontact.contact.guard import GUARD, PARTING, Guard, is_guard, no_places
+from tolcontact.contact.guard import GUARD, PARTING, Guard, is_guard
 from tolcontact.contact.scan import PENETRATION, Scan
 from tolcontact.contact.slots import Slots
 from tolcontact.discretization import FIRST_POINT, raised_places
@@ -18,7 +18,7 @@ from tolcontact.geometry.kernel import INSIDE
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting, parting
-from tolcontact.geometry.places import Look, RaisedPlaces, unraised
+from tolcontact.geometry.places import Look, Places
 
 EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
 
@@ -47,16 +47,16 @@ class BoundedSearch(FixedSearch):
 
     def touching_counts(self, X_RM: np.ndarray, deviations: np.ndarray, limit: float) -> np.ndarray:
         """Return the numbers of poses (point,) with a touching place to which a contact point is nearest."""
-        raised = raised_places(self.pair, self.meeting, X_RM, deviations)
-        row, place = np.nonzero(raised.gaps < limit)
-        _, nearest = KDTree(self.pair.P_m).query(raised.places.P_m[row, place])
+        places = raised_places(self.pair, self.meeting, X_RM, deviations)
+        row, place = np.nonzero(places.actual_gaps < limit)
+        _, nearest = KDTree(self.pair.P_m).query(places.P_m[row, place])
         realization_and_point = np.unique(np.column_stack([row, nearest]), axis=0)
         return np.bincount(realization_and_point[:, 1], minlength=len(self.pair.P_m))
 
     def touching(self, X_RM: np.ndarray, deviations: np.ndarray, nearness: float) -> tuple[np.ndarray, np.ndarray]:
-        raised = raised_places(self.pair, self.meeting, X_RM, deviations)
-        is_near = raised.gaps[0] < nearness
-        return pose.apply(X_RM[0], raised.places.P_m[0, is_near]), raised.places.n_r[0, is_near]
+        places = raised_places(self.pair, self.meeting, X_RM, deviations)
+        is_near = places.actual_gaps[0] < nearness
+        return pose.apply(X_RM[0], places.P_m[0, is_near]), places.n_r[0, is_near]
 
     def scan(
         self, X_RM: np.ndarray, deviations: np.ndarray, search: Search, former: Scan | None, slots: Slots | None
@@ -77,14 +77,14 @@ class BoundedSearch(FixedSearch):
             deepest = np.full(len(X_RM), self.free_depth) if deepest is None else deepest
         look = Look(kept, search.width * self.edge_error, ceilings=search.ceilings)
         look = look if search.width <= 1 else look._replace(nearness=np.inf)
-        raised = raised_places(self.pair, meeting, X_RM, deviations, look, self._bulge if self.has_minima else np.inf)
+        places = raised_places(self.pair, meeting, X_RM, deviations, look, self._bulge if self.has_minima else np.inf)
         if deepest is not None:
-            raised = raised.only(raised.gaps >= -deepest[:, None])
+            places = places.only(places.actual_gaps >= -deepest[:, None])
         if start.guarded and self.adds_guard and self.guard is not None:
-            raised = _with_guard(raised, self.guard, X_RM, labels)
+            places = _with_guard(places, self.guard, X_RM, labels)
         if start.parted and self.parting is not None:
-            raised = _with_parting(raised, self.parting, X_RM, labels)
-        return BoundedScan(meeting, SearchedPlaces.of(raised))
+            places = _with_parting(places, self.parting, X_RM, labels)
+        return BoundedScan(meeting, places)
 
     @cached_property
     def guard(self) -> Guard | None:
@@ -125,7 +125,7 @@ def _kept(labels: np.ndarray, former: Scan | None, at_rest: np.ndarray | None) -
     return np.concatenate([kept, former.minima], axis=1) if isinstance(former, BoundedScan) else kept
 
 
-def _with_guard(raised: RaisedPlaces, guard: Guard, X_RM: np.ndarray, former_labels: np.ndarray | None) -> RaisedPlaces:
+def _with_guard(places: Places, guard: Guard, X_RM: np.ndarray, former_labels: np.ndarray | None) -> Places:
     """Return places with one more where bodies interfere and no place shows it.
 
     If such a place was active before (`former_labels` (n, k)), it is found again: else bodies would interfere again at once.
@@ -133,14 +133,11 @@ def _with_guard(raised: RaisedPlaces, guard: Guard, X_RM: np.ndarray, former_lab
     labels = np.full(len(X_RM), -1)
     if former_labels is not None:
         labels = np.where(is_guard(former_labels), former_labels, -1).max(axis=1, initial=-1)
-    rows = np.flatnonzero((labels >= 0) | (raised.gaps.min(axis=1, initial=np.inf) >= -PENETRATION))
-    extra = no_places(len(X_RM))
-    for values, of_rows in zip(extra, guard.places(X_RM[rows], labels[rows]), strict=True):
-        values[rows] = of_rows
-    return raised.followed_by(unraised(extra))
+    rows = np.flatnonzero((labels >= 0) | (places.actual_gaps.min(axis=1, initial=np.inf) >= -PENETRATION))
+    return places.followed_by(guard.places(X_RM[rows], labels[rows]).among(len(X_RM), rows))
 
 
-def _with_parting(raised: RaisedPlaces, parting: Parting, X_RM: np.ndarray, former_labels: np.ndarray | None) -> RaisedPlaces:
+def _with_parting(places: Places, parting: Parting, X_RM: np.ndarray, former_labels: np.ndarray | None) -> Places:
     """Return places that separate convex bodies in the best direction, and the best place.
 
     Bodies are free once they are separate in one direction; penetrating places with other normals would push them as well. The
@@ -148,9 +145,9 @@ def _with_parting(raised: RaisedPlaces, parting: Parting, X_RM: np.ndarray, form
     (n, k)) are added, too.
     """
     axis = parting.at(X_RM)
-    is_aligned = (raised.places.n_r * axis.n_r).sum(axis=2) > ALIGNED
-    raised = raised.only((raised.gaps >= -INSIDE) | ((axis.gaps < -INSIDE) & is_aligned))
-    shown = np.where(is_aligned, raised.gaps, np.inf).min(axis=1, initial=np.inf)[:, None]
+    is_aligned = (places.n_r * axis.n_r).sum(axis=2) > ALIGNED
+    places = places.only((places.actual_gaps >= -INSIDE) | ((axis.gaps < -INSIDE) & is_aligned))
+    shown = np.where(is_aligned, places.actual_gaps, np.inf).min(axis=1, initial=np.inf)[:, None]
     is_new = axis.gaps < shown - SHOWN_SHARE * np.maximum(np.abs(axis.gaps), INSIDE)
     labels = np.where(is_new, PARTING + axis.labels, -1)
     added = [axis._replace(labels=labels, gaps=np.where(is_new, axis.gaps, np.inf))]
@@ -158,4 +155,4 @@ def _with_parting(raised: RaisedPlaces, parting: Parting, X_RM: np.ndarray, form
         edges = np.where((former_labels >= PARTING) & (former_labels != labels), former_labels - PARTING, -1)
         crossings = parting.crossings(X_RM, edges, axis.n_r[:, 0])
         added.append(crossings._replace(labels=np.where(np.isfinite(crossings.gaps), former_labels, -1)))
-    return raised.followed_by(*map(unraised, added))
+    return places.followed_by(*added)

@@ -33,11 +33,6 @@ def _direction(labels: Int[Array, " n"]) -> Float[Array, "n 3"]:
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def no_places(count: int) -> Places:
-    """Return empty places (n, 1)."""
-    return Places(np.full((count, 1), -1), np.full((count, 1), np.inf), *np.zeros((3, count, 1, 3)))
-
-
 @dataclass(frozen=True, eq=False)
 class Guard:
     """The bodies of a pair as the search moves them: as a whole, with the face that touches.
@@ -68,7 +63,7 @@ class Guard:
 
         labels   (n,) of the places that held the bodies apart before, -1 for none: these bodies touch, or are a little apart
         """
-        found = no_places(len(X_RM))
+        found = Places.none(len(X_RM), 1)
         self._part(found, np.arange(len(X_RM)), X_RM, np.zeros((len(X_RM), 3)))
         for apart in APART * sum(self.neighbours.insets):
             rows = np.flatnonzero((found.labels[:, 0] < 0) & (labels >= 0))
@@ -85,7 +80,7 @@ class Guard:
         rows, way = rows[is_known], WayOut(*(values[is_known] for values in way))
         arms = np.einsum("nij,nj->ni", pose.rotation(X_RM[rows]), way.places) + pose.translation(X_RM[rows]) - way.feet
         gaps = (arms * way.normals).sum(axis=1)
-        for values, of_rows in zip(found, (_label(way.normals), gaps, way.places, way.feet, way.normals), strict=True):
+        for values, of_rows in zip(found[:-1], (_label(way.normals), gaps, way.places, way.feet, way.normals), strict=True):
             values[rows, 0] = of_rows
 
     def ways_out(self, X_RM: Float[Array, "n 12"], directions: Float[Array, "n 3"] | None = None) -> WayOut:

@@ -10,12 +10,11 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float
 from tolcontact.contact import kernel
-from tolcontact.contact.bounded_scan import SearchedPlaces
 from tolcontact.contact.scan import Deepest, FixedScan, Scan
 from tolcontact.discretization import ContactPoints
 from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
-from tolcontact.geometry.places import RaisedPlaces
+from tolcontact.geometry.places import Places
 
 MIN_HEIGHTS = 4  # that vary independently: fewer are as fast in every pass
 
@@ -36,7 +35,7 @@ class RaisedScan(Scan):
 
     nominal: FixedScan
     raised: kernel.Raised
-    minima: SearchedPlaces
+    minima: Places
 
     def take(self, rows: np.ndarray) -> "RaisedScan":
         return replace(self, raised=self.raised._replace(rows=self.raised.rows[rows]), minima=self.minima.take(rows))
@@ -62,11 +61,11 @@ class RaisedScan(Scan):
         points, gaps = self.nominal.deepest_of(clusters, relative, deviations, may_carry, raised=self.raised)
         if self.minima.labels.shape[1]:
             points = np.concatenate([points, np.maximum(self.minima.labels, 0)], axis=1)
-            gaps = np.concatenate([gaps, self.minima.gaps(relative)], axis=1)
+            gaps = np.concatenate([gaps, self.minima.gaps_at(relative)], axis=1)
         return Deepest(points, -gaps)
 
     def depth_between(self, relative: np.ndarray) -> np.ndarray:
-        return -self.minima.gaps(relative).min(axis=1, initial=0.0)
+        return -self.minima.gaps_at(relative).min(axis=1, initial=0.0)
 
     def with_minima(
         self,
@@ -88,20 +87,17 @@ class RaisedScan(Scan):
             if not is_clear.any():
                 return self
             rows = np.flatnonzero(is_clear)
-            found = self.take(rows).with_minima(pair, relative[rows], deviations[rows], depth).minima
-            every = SearchedPlaces.none(len(relative), found.labels.shape[1])
-            for values, of_clear in zip(every, found, strict=True):
-                values[rows] = of_clear
-            return replace(self, minima=every)
+            minima = self.take(rows).with_minima(pair, relative[rows], deviations[rows], depth).minima
+            return replace(self, minima=minima.among(len(relative), rows))
         grown, limits = pair.heights(deviations), pair.minima.bulge(deviations)
         gaps = self.nominal.gaps(relative, deviations, limits, raised=self.raised)
         P_m = self.nominal.pair.P_m[None]
         labels = pair.minima.find(relative, deviations, grown, P_m, gaps, limits, depth, in_steps=in_steps)
         labels = with_former(labels, self.minima.labels)
         if not labels.shape[1]:
-            return replace(self, minima=SearchedPlaces.none(len(relative)))
-        places, heights = pair.minima.at(relative, deviations, labels)
-        return replace(self, minima=SearchedPlaces.of(RaisedPlaces(places, heights + grown[:, None])))
+            return replace(self, minima=Places.none(len(relative)))
+        minima = pair.minima.at(relative, deviations, labels)
+        return replace(self, minima=minima._replace(heights=minima.heights + grown[:, None]))
 
 
 def raised_scan(scan: FixedScan, deviations: Float[Array, "realization contributor"], *, always: bool = False) -> Scan:
@@ -114,4 +110,4 @@ def raised_scan(scan: FixedScan, deviations: Float[Array, "realization contribut
     raised = kernel.Raised(points, leaves, branches, np.arange(count))
     slopes, heights = of.coordinates[of.basis.shape[1] :], np.ascontiguousarray(deviations)
     kernel.sum_heights(of.columns, slopes, of.leaves, of.branches, heights, raised)
-    return RaisedScan(scan, raised, SearchedPlaces.none(count))
+    return RaisedScan(scan, raised, Places.none(count))

@@ -15,7 +15,7 @@ from tolcontact.discretization.plane_minima import with_former
 from tolcontact.geometry import region_kernel
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
-from tolcontact.geometry.places import PLAIN, Look, Places, RaisedPlaces
+from tolcontact.geometry.places import PLAIN, Look, Places
 
 FIRST_POINT = 1 << 40  # label of the first contact point
 EXACT_SHARE = 0.1  # of the largest dip of the gap between points: heights in smaller gaps are exact, others from splines
@@ -29,7 +29,7 @@ def raised_places(
     deviations: Float[Array, "n contributor"],
     look: Look = PLAIN,
     depth: float = np.inf,
-) -> RaisedPlaces:
+) -> Places:
     """Return the candidate contacts of a pair at X_RM (n, 12), see Meeting.at, for deviations (n, contributor).
 
     Minima of the gap between contact points are among them if they are deeper than `depth` [mm]. Ceilings are of gaps between
@@ -40,15 +40,14 @@ def raised_places(
     if form is None:
         ceilings = None if look.ceilings is None else look.ceilings + grown[:, 0]
         places = meeting.at(X_RM, look._replace(ceilings=ceilings))
-        return RaisedPlaces(places, np.broadcast_to(grown, places.gaps.shape))
-    retained = look.retained
-    at_ends = None if retained is None else np.where(retained < FIRST_POINT, retained, -1)
-    ends = meeting.at(X_RM, look._replace(retained=at_ends, ceilings=None))
-    row, place = np.nonzero(np.isfinite(ends.gaps))
-    heights = np.zeros(ends.gaps.shape)
-    heights[row, place] = form.at(row, ends.P_m[row, place], ends.P_r[row, place])
-    raised = RaisedPlaces(ends, heights).followed_by(*_points(pair, form, X_RM, deviations, retained, depth))
-    return raised._replace(heights=grown + raised.heights)
+    else:
+        retained = look.retained
+        at_ends = None if retained is None else np.where(retained < FIRST_POINT, retained, -1)
+        ends = meeting.at(X_RM, look._replace(retained=at_ends, ceilings=None))
+        row, place = np.nonzero(np.isfinite(ends.gaps))
+        ends.heights[row, place] = form.at(row, ends.P_m[row, place], ends.P_r[row, place])
+        places = ends.followed_by(*_points(pair, form, X_RM, deviations, retained, depth))
+    return places._replace(heights=grown + places.heights)
 
 
 def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> tuple[Float[Array, "n point 3"], Float[Array, "n point"]]:
@@ -66,7 +65,7 @@ def rim_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> tuple[Float[A
 
 def _points(
     pair: ContactPoints, form: PairForm, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None, depth: float
-) -> tuple[RaisedPlaces, RaisedPlaces]:
+) -> tuple[Places, Places]:
     """Return points inside the rims of the faces as candidates, and minima of the gap between them, with the forms there.
 
     The points are the `retained` ones, and the lowest of each group: contact points, and after these points of the rim. The
@@ -120,7 +119,7 @@ def _points(
     moved = pose.apply(poses[row], P_m[row, place, None])[:, 0]
     true_feet = moved - ((moved - P_r[row, place]) @ pair.n_r[0])[:, None] * pair.n_r[0]
     heights[row, place] = form.at(row, P_m[row, place], true_feet)
-    return RaisedPlaces(Places(labels, gaps, P_m, P_r, n_r), heights), minima.at(poses, deviations, between)
+    return Places(labels, gaps, P_m, P_r, n_r, heights), minima.at(poses, deviations, between)
 
 
 def _exact(gaps: np.ndarray, bulge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

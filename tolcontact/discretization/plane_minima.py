@@ -18,7 +18,7 @@ from tolcontact.features import FaceDeviation, FormField
 from tolcontact.geometry import height_kernel, minima_kernel
 from tolcontact.geometry.height_kernel import HeightSums, HeightTable, Plane
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
-from tolcontact.geometry.places import Places, RaisedPlaces
+from tolcontact.geometry.places import Places
 from tolcontact.geometry.spreading import face_frame
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.tolerances import SAME_PLACE
@@ -162,14 +162,14 @@ class PlaneMinima:
 
     def at(
         self, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], labels: Int[Array, "n place"]
-    ) -> RaisedPlaces:
+    ) -> Places:
         """Return the candidates with labels at X_RM, -1 for none, with the form deviations there."""
         P_m, P_r = np.zeros((2, *labels.shape, 3))
         gaps, heights = np.empty((2, *labels.shape))
         inputs = self._inputs(X_RM, deviations)
         minima_kernel.write_places(*inputs, np.ascontiguousarray(labels), self.slack, P_m, P_r, gaps, heights)
-        n_r = np.broadcast_to(self.reference.normal, P_m.shape)
-        return RaisedPlaces(Places(np.where(np.isfinite(gaps), labels, -1), gaps, P_m, P_r, n_r), heights)
+        n_r = np.tile(self.reference.normal, (*labels.shape, 1))
+        return Places(np.where(np.isfinite(gaps), labels, -1), gaps, P_m, P_r, n_r, heights)
 
     def points(self, labels: Int[Array, " place"]) -> Float[Array, "place 3"]:
         """Return the nominal positions [mm] of labels on the moving plane."""

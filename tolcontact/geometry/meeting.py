@@ -194,19 +194,16 @@ class Meeting:
             labels=np.where(extended_places.labels >= 0, extended_places.labels + count, -1)
         )
         width = max(nearby.gaps.shape[1], extended_places.gaps.shape[1])
-        padded = []
-        for empty, nearby_values, extended_values in zip((-1, np.inf, 0.0, 0.0, 0.0), nearby, extended_places, strict=True):
-            values = np.full((len(X_RM), width, *nearby_values.shape[2:]), empty, dtype=nearby_values.dtype)
+        empty, padded = Places.none(len(rows), width), Places.none(len(X_RM), width)
+        for values, nearby_values, no_values, extended_values in zip(padded, nearby, empty, extended_places, strict=True):
             values[:, : nearby_values.shape[1]] = nearby_values
-            values[rows], values[rows, : extended_values.shape[1]] = empty, extended_values
-            padded.append(values)
-        return Places(*padded)
+            values[rows] = no_values
+            values[rows, : extended_values.shape[1]] = extended_values
+        return padded
 
     def _near(self, X_RM: np.ndarray, look: Look) -> Places:
         """Return contact points at poses within reach."""
-        width = max(min(len(self), MAX_POINTS), 1)
-        shape = (len(X_RM), width)
-        places = Places(np.empty(shape, dtype=np.int64), np.empty(shape), *(np.zeros((*shape, 3)) for _ in range(3)))
+        places = Places.none(len(X_RM), max(min(len(self), MAX_POINTS), 1))
         # Bodies that were beyond reach before may have kept candidates of the extended meeting.
         retained = np.zeros((len(X_RM), 0), dtype=np.int64) if look.retained is None else look.retained
         retained = np.where(retained < len(self), retained, -1)
@@ -218,7 +215,7 @@ class Meeting:
             ),
             kernel.MARGIN * self.size + self.overhang,
             np.array([look.error, self.reach.depth, look.nearness, self.overhang]),
-            np.ascontiguousarray(X_RM), retained, ceilings, DIRECTIONS, *places,
+            np.ascontiguousarray(X_RM), retained, ceilings, DIRECTIONS, *places[:-1],
         )  # fmt: skip
         return Places(*(np.ascontiguousarray(values[:, : max(count, 1)]) for values in places))
 

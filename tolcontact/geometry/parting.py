@@ -34,20 +34,19 @@ class Parting:
         The normal is the axis, and the gap is negative if the bodies penetrate each other. The label is the index of the pair
         of edges that cross along the axis, -1 if it is the normal of a plane.
         """
-        count = len(X_RM)
-        edges, gaps, (P_m, P_r, n_r) = np.empty(count, dtype=np.int64), np.empty(count), np.empty((3, count, 3))
-        parting_kernel.part(self.moving, self.reference, np.ascontiguousarray(X_RM), edges, gaps, P_m, P_r, n_r)
-        return Places(edges[:, None], gaps[:, None], P_m[:, None], P_r[:, None], n_r[:, None])
+        places = Places.none(len(X_RM), 1)
+        of_poses = (np.squeeze(values, axis=1) for values in places[:-1])
+        parting_kernel.part(self.moving, self.reference, np.ascontiguousarray(X_RM), *of_poses)
+        return places
 
     def crossings(self, X_RM: Float[Array, "n 12"], edges: Int[Array, "n k"], axes: Float[Array, "n 3"]) -> Places:
         """Return the points of pairs of `edges` (n, k), -1 for none, along their common normals, at poses X_RM (n, 12).
 
         Normals have the sense of `axes` (n, 3); gaps are infinite where edges do not cross.
         """
-        P_m, P_r, n_r = np.zeros((3, *edges.shape, 3))
-        crossings = Places(np.ascontiguousarray(edges), np.empty(edges.shape), P_m, P_r, n_r)
+        crossings = Places.none(*edges.shape)._replace(labels=np.ascontiguousarray(edges))
         poses, senses = np.ascontiguousarray(X_RM), np.ascontiguousarray(axes)
-        parting_kernel.cross_edges(self.moving, self.reference, poses, crossings.labels, senses, *crossings[1:])
+        parting_kernel.cross_edges(self.moving, self.reference, poses, crossings.labels, senses, *crossings[1:-1])
         return crossings
 
 
