@@ -35,13 +35,13 @@ class RoundZone:
     def __init__(self, zone: ComponentZone, drive: np.ndarray) -> None:
         self._zone, self._drive = zone, drive
         self.components, self.middle, self.columns = zone.columns, zone.middle, np.unique(zone.columns)
-        if zone.sizes is not None:
+        if zone.sizes.size:
             self.columns = np.union1d(self.columns, np.flatnonzero(drive[:, zone.sizes].any(axis=1)))
 
     def extent(self, driven_bounds: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         """Return the largest distance (component,) from the centre, for bounds (contributor,) of deviations."""
         zone, widest = self._zone, self._zone.width
-        if zone.sizes is not None:
+        if zone.sizes.size:
             ends = np.array(driven_bounds)[:, zone.sizes]
             widest += float((zone.growth * (ends - zone.limit)).max())
         # From |rows c| <= half follows |c| <= |inverse| half, entry by entry.
@@ -75,7 +75,7 @@ class RoundZone:
                 plane = np.zeros(len(self._drive))
                 plane[self.components] = normal @ row
                 end = zone.width / 2 + plane[self.components] @ self.middle
-                if zone.sizes is not None:
+                if zone.sizes.size:
                     # |row| <= (width + growth (size - limit)) / 2, with the effects of shared causes in the size
                     plane -= zone.growth / 2 * self._drive[:, zone.sizes[number]]
                     end -= zone.growth / 2 * zone.limit
@@ -85,7 +85,7 @@ class RoundZone:
     def _half(self, points: np.ndarray) -> np.ndarray:
         """Return half the width (n, point) of the zone, with its bonus."""
         zone = self._zone
-        if zone.sizes is None:
+        if not zone.sizes.size:
             return np.full((len(points), len(zone.rows)), zone.width / 2)
         return np.asarray((zone.width + zone.growth * (points @ self._drive[:, zone.sizes] - zone.limit)) / 2)
 

@@ -14,7 +14,6 @@ from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.places import Places
 
 MAX_DEEPEST = MANY_SLOTS  # places of a pair that get a row in one round
-MIN_HEIGHTS = 4  # that vary independently: fewer are as fast in every pass
 
 
 @dataclass(frozen=True, eq=False)

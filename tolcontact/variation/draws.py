@@ -12,7 +12,6 @@ are the coefficients of standardized x and y in normalized Hermite polynomials (
 import copy
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -24,7 +23,7 @@ from tolcontact.errors import ModelError
 from tolcontact.features.datum_frames import Shifts
 from tolcontact.features.freedoms import Freedom
 from tolcontact.variation.plans import STREAM, Numbers, planned_numbers
-from tolcontact.variation.spreads import envelopes, fill_zones
+from tolcontact.variation.spreads import ComponentZone, Envelope, envelopes, fill_zones
 from tolcontact.vocabulary import MONTE_CARLO
 
 MAX_SCORE, SCORES, TERMS = 8.0, 8001, 80
@@ -97,19 +96,6 @@ def in_words(correlation: Correlation, matrix: np.ndarray, freedoms: Sequence[Fr
     )
 
 
-class Bonus(NamedTuple):
-    """What sizes scale: the components of a zone that grows with them, or the form inside an envelope of perfect form.
-
-    sizes    columns of the sizes
-    columns  of the components or of the coefficients of the form
-    scale    returns the factor (n,) of these for deviations (n, contributor)
-    """
-
-    sizes: np.ndarray
-    columns: np.ndarray
-    scale: Callable[[np.ndarray], np.ndarray]
-
-
 class Draws:
     """The draws of a model. Raises ModelError if rules cannot be applied to a feature.
 
@@ -123,8 +109,8 @@ class Draws:
 
     def __init__(self, nominal: Nominal) -> None:
         self.contributors, self.zones, self.mean_widths = fill_zones(nominal)
-        self._bonuses = [Bonus(np.unique(zone.sizes), zone.added, zone.scale) for zone in self.zones if zone.sizes is not None]
-        self._bonuses += [Bonus(np.array([form.size]), form.columns, form.scale) for form in envelopes(nominal)]
+        self._scaling: list[ComponentZone | Envelope] = [zone for zone in self.zones if zone.sizes.size]
+        self._scaling += envelopes(nominal)
         self.shifts = [shift for pattern in nominal.patterns for shift in pattern.shifts]
         self._assembly = assembly = nominal.assembly
         self._column = {contributor.label: k for k, contributor in enumerate(self.contributors)}
@@ -217,7 +203,7 @@ class Draws:
         measured = zip(self._assembly.populations, self.population_labels, self.populations, strict=True)
         for population, label, (columns, values) in measured:
             deviations[:, columns] = values[population.rows(numbers(label))]
-        self._add_causes_and_bonuses(deviations)
+        self._add_causes_and_scale(deviations)
         self.add_shifts(deviations)
         for contributor, drawn in zip(self.contributors, deviations.T, strict=True):
             if not np.isfinite(drawn).all():
@@ -232,14 +218,14 @@ class Draws:
         for shift in self.shifts:
             deviations[:, shift.columns] = shift.shifts(deviations, computed)
 
-    def _add_causes_and_bonuses(self, deviations: np.ndarray) -> None:
+    def _add_causes_and_scale(self, deviations: np.ndarray) -> None:
         """Add shared causes to sizes, scale components by the bonus of their sizes, and add shared causes to the rest."""
         measured = [column for columns, _ in self.populations for column in columns]
-        sizes = {int(size) for bonus in self._bonuses for size in bonus.sizes}
+        sizes = {int(size) for zone in self._scaling for size in zone.sizes}
         self._add_causes(deviations, lambda column: column in sizes)
-        for bonus in self._bonuses:
-            columns = np.setdiff1d(bonus.columns, measured)  # measured parts have used their bonus
-            deviations[:, columns] *= bonus.scale(deviations)[:, None]
+        for zone in self._scaling:
+            columns = np.setdiff1d(zone.scaled, measured)  # measured parts have used their bonus
+            deviations[:, columns] *= zone.scale(deviations)[:, None]
         self._add_causes(deviations, lambda column: column not in sizes)
 
     @property
@@ -256,7 +242,7 @@ class Draws:
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
         sets += [list(map(int, columns)) for columns, _ in self.populations]
         together = [[*shift.columns, *map(int, shift.sources)] for shift in self.shifts]
-        together += [sorted({*map(int, bonus.sizes), *map(int, bonus.columns)}) for bonus in self._bonuses]
+        together += [sorted({*map(int, zone.sizes), *map(int, zone.scaled)}) for zone in self._scaling]
         # What follows from others by more than a sum also follows from the causes that drive them.
         followed = {column for columns in together for column in columns}
         of_causes = ([self._column[label] for label in (cause.name, *cause.drives)] for cause in self._assembly.variables)

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -97,24 +97,24 @@ class ComponentZone:
     rows        (point, entry, component)
     middle      (component,): nonzero for an unequally disposed zone (UZ)
     width       [mm] without the bonus
-    added       columns of the components that the tolerance adds to narrower ones: they fill the zone with its bonus
+    scaled      columns of the components that the tolerance adds to narrower ones: they fill the zone with its bonus
     drawn_width [mm] for which the spreads of these components are computed
-    sizes       (point,) columns of sizes, if the zone grows as these depart from `limit` in the direction `growth` (1, -1)
+    sizes       (point,) columns of sizes, if the zone grows as these depart from `limit` in the direction `growth` (1, -1);
+                none for a zone without a bonus
     """
 
     columns: np.ndarray
     rows: np.ndarray
     middle: np.ndarray
     width: float
-    added: np.ndarray
+    scaled: np.ndarray
     drawn_width: float
-    sizes: np.ndarray | None = None
+    sizes: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     limit: float = 0.0
     growth: float = 0.0
 
     def scale(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the factor (n,) of the added components for the bonus of deviations (n, contributor)."""
-        assert self.sizes is not None
+        """Return the factor (n,) of the scaled components for the bonus of deviations (n, contributor)."""
         sizes = deviations[:, np.unique(self.sizes)]
         bonus = np.maximum(self.growth * (sizes - self.limit), 0.0)
         return np.asarray((self.width + bonus.min(axis=1)) / self.drawn_width)
@@ -126,16 +126,16 @@ class Envelope:
 
     A form that would leave it is scaled until it touches the envelope about the feature's own axis or centre.
 
-    columns  of the deviations: the coefficients of the form
+    scaled   columns of the coefficients of the form
     heights  (mode, place) [mm] of the form outside the material, for coefficients of 1
-    size     column of the size
+    sizes    (1,): column of the size
     limit    its deviation [mm] at maximum material
     growth   1.0 if larger sizes have less material (a hole), else -1.0
     """
 
-    columns: np.ndarray
+    scaled: np.ndarray
     heights: np.ndarray
-    size: int
+    sizes: np.ndarray
     limit: float
     growth: float
 
@@ -144,20 +144,20 @@ class Envelope:
         highest = np.zeros(len(deviations))
         for start in range(0, len(deviations), ENVELOPED):
             rows = slice(start, start + ENVELOPED)
-            heights = np.einsum("nm,mp->np", deviations[rows, self.columns], self.heights)
+            heights = np.einsum("nm,mp->np", deviations[rows, self.scaled], self.heights)
             highest[rows] = heights.max(axis=1)
-        room = np.maximum(self.growth * (deviations[:, self.size] - self.limit), 0.0) / 2
+        room = np.maximum(self.growth * (deviations[:, self.sizes[0]] - self.limit), 0.0) / 2
         return np.minimum(room / np.maximum(highest, TINY), 1.0)
 
 
 def envelopes(nominal: Nominal) -> list[Envelope]:
     """Return the envelopes of features whose form is drawn and has to stay inside."""
     return [
-        Envelope(np.array(member.form_columns), member.form.place_heights, member.size_column, *_departure(member, size, "M"))
+        Envelope(np.array(member.form_columns), member.form.place_heights, np.array([column]), *_departure(member, size, "M"))
         for pattern in nominal.patterns
         if pattern.declared.is_enveloped and not pattern.is_gauge and (size := pattern.declared.size) is not None
         for member in pattern.members
-        if member.form is not None and member.size_column is not None
+        if member.form is not None and (column := member.size_column) is not None
     ]
 
 
