@@ -1,25 +1,27 @@
 """The search of bounded faces: the places where two bodies can touch are found at every pose."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
-from tolcontact.compilation import Program
-from tolcontact.contact.bounded_scan import BoundedScan
+from tolcontact.arrays import Array, Int
+from tolcontact.compilation import MANY_SLOTS, Program
 from tolcontact.contact.fixed_search import Carriers, FixedSearch, Search
 from tolcontact.contact.guard import GUARD, PARTING, Guard, is_guard
-from tolcontact.contact.scan import PENETRATION, Scan
+from tolcontact.contact.scan import PENETRATION, Deepest, Scan
 from tolcontact.contact.slots import Slots
 from tolcontact.discretization import FIRST_POINT, raised_places
-from tolcontact.geometry.kernel import INSIDE
+from tolcontact.geometry.kernel import CORNER_ON_FACET, INSIDE
 from tolcontact.geometry.meeting import Meeting
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
 from tolcontact.geometry.parting import Parting, parting
 from tolcontact.geometry.places import Look, Places
 
+MAX_DEEPEST = MANY_SLOTS  # places of a pair that get a row in one round
 EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
 
 # The largest penetration of free bodies, of the smallest tolerance range. Where places are deeper and the complete test sees
@@ -27,6 +29,53 @@ EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond
 FREE_SHARE = 1e-2
 ALIGNED = 0.87  # cosine of the largest angle between the axis of separation and the normal of a penetrating place that counts
 SHOWN_SHARE = 0.05  # of the gap along this axis: no place is added if another place shows the gap to within this share
+
+
+@dataclass(frozen=True, eq=False)
+class BoundedScan(Scan):
+    """Places where a pair can touch at given poses: for each realization, the places with the smallest gaps.
+
+    places   whose labels are their indices in the meeting of the pair
+    """
+
+    fills = True
+
+    meeting: Meeting
+    places: Places
+
+    def take(self, rows: np.ndarray) -> "BoundedScan":
+        return BoundedScan(self.meeting, self.places.take(rows))
+
+    @property
+    def minima(self) -> Int[Array, "realization minimum"]:
+        """The labels of minima of the gap between contact points, -1 for none."""
+        labels = self.places.labels
+        is_minimum = labels >= FIRST_PLACE
+        return np.where(is_minimum, labels, -1)[:, is_minimum.any(axis=0)]
+
+    def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        gaps = np.where(self.places.labels < FIRST_PLACE, self.places.gaps_at(relative), np.inf)
+        return gaps.min(axis=1, initial=np.inf)
+
+    def depth_between(self, relative: np.ndarray) -> np.ndarray:
+        gaps = np.where(self.places.labels < FIRST_PLACE, np.inf, self.places.gaps_at(relative))
+        return -gaps.min(axis=1, initial=0.0)
+
+    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
+        count = min(MAX_DEEPEST, self.places.labels.shape[1])
+        return Deepest(*self.places.deepest(relative, count, self.meeting.reach.spread))
+
+    def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.places.rows(points)
+
+    def holds(self, points: np.ndarray) -> np.ndarray:
+        return self.places.holds(points)
+
+    def moves(self, points: np.ndarray) -> np.ndarray:
+        if not len(self.meeting.kinds):
+            return np.zeros(points.shape, dtype=bool)
+        at_ends = np.where(points < FIRST_POINT, points, 0)
+        return (self.meeting.kinds[at_ends] == CORNER_ON_FACET) & (points < FIRST_POINT)
 
 
 class BoundedSearch(FixedSearch):
