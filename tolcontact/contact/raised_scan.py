@@ -4,7 +4,7 @@ The smallest gap of a leaf follows from the gaps of its nominal points and its l
 of the gap between their points, which are searched from the deepest point of each leaf.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,11 +20,9 @@ MIN_HEIGHTS = 4  # that vary independently: fewer are as fast in every pass
 
 
 @dataclass(frozen=True, eq=False)
-class RaisedScan(Scan):
-    """A scan of some of the realizations of a block.
+class RaisedScan(FixedScan):
+    """A scan of some of the realizations of a block: the nominal points, with their heights in these realizations.
 
-    nominal   the scan of the nominal faces
-    raised    the heights of the realizations of the block, and the indices of those of this scan
     minima    of the gap between the points
 
     The lowest points of clusters take the remaining slots, too: faces with form end up on a few points anywhere, and fewer QPs
@@ -33,20 +31,15 @@ class RaisedScan(Scan):
 
     fills = True
 
-    nominal: FixedScan
-    raised: kernel.Raised
-    minima: Places
+    minima: Places = field(kw_only=True)
 
     def take(self, rows: np.ndarray) -> "RaisedScan":
         return replace(self, raised=self.raised._replace(rows=self.raised.rows[rows]), minima=self.minima.take(rows))
 
-    def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        return self.nominal.deepest_of(self.nominal.clusters[[0, -1]], relative, deviations, raised=self.raised)[1][:, 0]
-
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         is_point, realization = points < FIRST_PLACE, self.raised.rows[:, None]
         numbers = np.where(is_point, points, 0)
-        P_m, P_r, n_r = (x[numbers] for x in (self.nominal.pair.P_m, self.nominal.pair.P_r, self.nominal.pair.n_r))
+        P_m, P_r, n_r = (x[numbers] for x in (self.pair.P_m, self.pair.P_r, self.pair.n_r))
         P_r = P_r - self.raised.points[realization, numbers][..., None] * n_r
         if not is_point.all():
             both = zip((P_m, P_r, n_r), self.minima.rows(points), strict=True)
@@ -57,12 +50,11 @@ class RaisedScan(Scan):
         return self.minima.holds(points) | (points < FIRST_PLACE)
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
-        clusters = self.nominal.clusters
-        points, gaps = self.nominal.deepest_of(clusters, relative, deviations, may_carry, raised=self.raised)
+        points, depth = super().deepest(relative, deviations, may_carry)
         if self.minima.labels.shape[1]:
             points = np.concatenate([points, np.maximum(self.minima.labels, 0)], axis=1)
-            gaps = np.concatenate([gaps, self.minima.gaps_at(relative)], axis=1)
-        return Deepest(points, -gaps)
+            depth = np.concatenate([depth, -self.minima.gaps_at(relative)], axis=1)
+        return Deepest(points, depth)
 
     def depth_between(self, relative: np.ndarray) -> np.ndarray:
         return -self.minima.gaps_at(relative).min(axis=1, initial=0.0)
@@ -90,9 +82,8 @@ class RaisedScan(Scan):
             minima = self.take(rows).with_minima(pair, relative[rows], deviations[rows], depth).minima
             return replace(self, minima=minima.among(len(relative), rows))
         grown, limits = pair.heights(deviations), pair.minima.bulge(deviations)
-        gaps = self.nominal.gaps(relative, deviations, limits, raised=self.raised)
-        P_m = self.nominal.pair.P_m[None]
-        labels = pair.minima.find(relative, deviations, grown, P_m, gaps, limits, depth, in_steps=in_steps)
+        gaps = self.gaps(relative, deviations, limits)
+        labels = pair.minima.find(relative, deviations, grown, self.pair.P_m[None], gaps, limits, depth, in_steps=in_steps)
         labels = with_former(labels, self.minima.labels)
         if not labels.shape[1]:
             return replace(self, minima=Places.none(len(relative)))
@@ -110,4 +101,4 @@ def raised_scan(scan: FixedScan, deviations: Float[Array, "realization contribut
     raised = kernel.Raised(points, leaves, branches, np.arange(count))
     slopes, heights = of.coordinates[of.basis.shape[1] :], np.ascontiguousarray(deviations)
     kernel.sum_heights(of.columns, slopes, of.leaves, of.branches, heights, raised)
-    return RaisedScan(scan, raised, Places.none(count))
+    return RaisedScan(scan.pair, scan.nominal_points, scan.clusters, scan.tables, raised, minima=Places.none(count))

@@ -84,28 +84,25 @@ class FixedScan(Scan):
     points     as compiled passes take them
     clusters   (cluster + 1,): the first branch of each cluster, and the end
     tables     moment tables (moment, point) of the sides that enter the objective
+    raised     the heights of the points, if they are known; otherwise they follow from the deviations
     """
 
     pair: ContactPoints
     points: kernel.Points
     clusters: Int[Array, " _"]
     tables: tuple[Float[Array, "moment point"], ...]
+    raised: kernel.Raised = NOT_RAISED
 
     def gaps(
         self,
         relative: Float[Array, "realization 12"],
         deviations: Float[Array, "realization contributor"],
         limits: Float[Array, " realization"] | None = None,
-        *,
-        raised: kernel.Raised | None = None,
     ) -> Float[Array, "realization point"]:
-        """Return gaps (realization, point) [mm]; infinite ones of leaves where all are above `limits` (realization,) [mm].
-
-        raised   the heights of the points, if they are known; otherwise they follow from the deviations
-        """
+        """Return gaps (realization, point) [mm]; infinite ones of leaves where all are above `limits` (realization,) [mm]."""
         gaps = np.empty((len(relative), len(self.pair.P_m)))
         limits = np.full(len(relative), np.inf) if limits is None else limits
-        kernel.write_gaps(*self._inputs(relative, deviations, raised), limits, gaps)
+        kernel.write_gaps(*self._inputs(relative, deviations), limits, gaps)
         return gaps
 
     def survey(
@@ -129,7 +126,7 @@ class FixedScan(Scan):
         return P_m, P_r, n_r
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
-        points, gaps = self.deepest_of(self.clusters, relative, deviations, may_carry, 0.0)
+        points, gaps = self.deepest_of(self.clusters, relative, deviations, may_carry, np.inf if self.fills else 0.0)
         return Deepest(points, -gaps)
 
     def deepest_of(
@@ -139,31 +136,27 @@ class FixedScan(Scan):
         deviations: Float[Array, "realization contributor"],
         may_carry: Bool[Array, "realization point"] | None = None,
         limit: float = np.inf,
-        *,
-        raised: kernel.Raised | None = None,
     ) -> tuple[Int[Array, "realization cluster"], Float[Array, "realization cluster"]]:
         """Return index and gap [mm] of the deepest point of each cluster, if its gap is less than `limit` [mm].
 
         Otherwise these are the first point of the cluster, and `limit`.
 
         clusters   (cluster + 1,): the first branch of each cluster, and the end
-        raised     the heights of the points, if they are known; otherwise they follow from the deviations
         """
         points = np.empty((len(relative), len(clusters) - 1), dtype=np.int64)
         gaps = np.empty(points.shape)
         mask = np.empty((len(relative), 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
-        kernel.deepest(*self._inputs(relative, deviations, raised), clusters, mask, limit, points, gaps)
+        kernel.deepest(*self._inputs(relative, deviations), clusters, mask, limit, points, gaps)
         return points, gaps
 
     def _inputs(
-        self, relative: np.ndarray, deviations: np.ndarray, raised: kernel.Raised | None
+        self, relative: np.ndarray, deviations: np.ndarray
     ) -> tuple[kernel.Points, kernel.Raised, np.ndarray, np.ndarray]:
         """Return the first arguments of compiled passes."""
-        points = self.points if raised is None else self._nominal_points
-        return points, raised or NOT_RAISED, np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+        return self.points, self.raised, np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
 
     @cached_property
-    def _nominal_points(self) -> kernel.Points:
+    def nominal_points(self) -> kernel.Points:
         """The points without the heights that deviations add."""
         points, size = self.points, self.points.basis.shape[1]
         leaf_boxes, branch_boxes = (
