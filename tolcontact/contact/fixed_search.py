@@ -15,7 +15,7 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.contact import kernel
 from tolcontact.contact.raised_scan import RaisedScan, raised_scan
-from tolcontact.contact.scan import FixedScan, Scan, pair_scan, project
+from tolcontact.contact.scan import FixedScan, ProjectedScan, Scan, pair_scan
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.starts import FIRST, Start
 from tolcontact.geometry.minima_kernel import FIRST_PLACE
@@ -142,9 +142,18 @@ class FixedSearch:
         is_raw = not isinstance(former, RaisedScan)
         return raised.with_minima(self.pair, X_RM, deviations, self._bulge, is_raw=is_raw, in_steps=search.width > 0)
 
-    def projected(self, X_RM: Float[Array, "n 12"]) -> Scan:
-        """Return a scan of the points, projected again at X_RM."""
-        return project(self.fixed, X_RM, self._margin)
+    def projected(self, X_RM: Float[Array, "n 12"]) -> ProjectedScan:
+        """Return a scan of the points, each projected again at X_RM onto the curved reference face.
+
+        Points that overhang its rim by half their spacing still count, so that none come and go with every step.
+        """
+        scan, surface = self.fixed, self.pair.reference_face
+        assert surface is not None
+        moved = pose.apply(X_RM, scan.pair.P_m)
+        feet, normals, over = surface.project(moved.reshape(-1, 3), margin=self._margin)
+        if self.pair.coordinate_error:
+            feet = feet - self.pair.coordinate_error * normals
+        return ProjectedScan(scan, feet.reshape(moved.shape), normals.reshape(moved.shape), over.reshape(moved.shape[:2]))
 
     @cached_property
     def _margin(self) -> float:

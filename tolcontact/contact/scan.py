@@ -223,22 +223,6 @@ class ProjectedScan(Scan):
         return self.fixed.pair.P_m[points], feet, normals
 
 
-def project(scan: FixedScan, relative: Float[Array, "realization 12"], margin: float) -> Scan:
-    """Return the scan of a pair with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
-
-    Points that overhang the rim by up to `margin` [mm] still count, so that points at the rim do not appear and
-    vanish with every step.
-    """
-    surface = scan.pair.reference_face
-    if surface is None:
-        return scan
-    shape = (len(relative), len(scan.pair.P_m), 3)
-    feet, normals, over = surface.project(pose.apply(relative, scan.pair.P_m).reshape(-1, 3), margin=margin)
-    if scan.pair.coordinate_error:
-        feet = feet - scan.pair.coordinate_error * normals
-    return ProjectedScan(scan, feet.reshape(shape), normals.reshape(shape), over.reshape(shape[:2]))
-
-
 def pair_scan(
     pair: ContactPoints, gaps: GapMap, tables: Sequence[np.ndarray], clusters: int, points: np.ndarray | None = None
 ) -> FixedScan:
