@@ -5,6 +5,7 @@ state. In the exact resolution (repeated steps) the linear term contains the res
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import casadi as ca
@@ -14,7 +15,7 @@ from tolcontact.mechanics.displacement import MOMENTS, displacement_energy, mome
 from tolcontact.mechanics.group_equations import GroupEquations
 from tolcontact.mechanics.groups import Group, Side
 from tolcontact.mechanics.placement import elongation
-from tolcontact.mechanics.pose import Pose, Vector, constant, relative
+from tolcontact.mechanics.pose import Pose, constant, relative
 from tolcontact.method import Method
 
 # The paper's eta of (11), the weight of the regularization: small enough not to move what the objective fixes, and large enough
@@ -57,7 +58,7 @@ def objective_scale(group: Group, method: Method, moments: ca.SX) -> ca.SX:
 
 def proximity(system: GroupEquations, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
     """Return half the mean squared displacement of all contact points [mm^2] between two poses."""
-    energies = (_displaced(system, points, start, end) for points in _points_of_parts(system.group))
+    energies = (_displaced(system, side, start, end) for side in _sides_of_parts(system.group))
     return sum(energies, ca.SX(0)) / system.group.count
 
 
@@ -107,7 +108,7 @@ def _regularization(system: GroupEquations, poses: Sequence[Pose]) -> ca.SX:
 
 def _point_energies(system: GroupEquations, poses: Sequence[Pose]) -> list[ca.SX]:
     """Return the displacement energy of all contact points of each side."""
-    return [_displaced(system, _points_of_side(side), system.raw, poses) for side in system.group.sides]
+    return [_displaced(system, side, system.raw, poses) for side in system.group.sides]
 
 
 def _identity_energies(system: GroupEquations, poses: Sequence[Pose]) -> list[ca.SX]:
@@ -122,37 +123,24 @@ def _identity_energies(system: GroupEquations, poses: Sequence[Pose]) -> list[ca
 _REGULARIZATIONS = {"points": _point_energies, "identity": _identity_energies}
 
 
-class _PartPoints(NamedTuple):
-    """Contact points of a part of the group, by their moments (10,) about a nominal centre (3,) [mm]."""
-
-    part: int
-    centre: Vector
-    moments: Vector
-
-
-def _points_of_parts(group: Group) -> list[_PartPoints]:
-    """Return all contact points, grouped by part, or by side if moments are symbols."""
-    sides = [_points_of_side(side) for side in group.sides]
-    points_by_part: dict[int, _PartPoints] = {}
-    for points in sides:
-        if isinstance(points.centre, ca.SX) or isinstance(points.moments, ca.SX):
-            return sides
-        total = points_by_part.get(points.part, points._replace(moments=np.zeros(MOMENTS)))
-        moments = total.moments + moments_about(np.asarray(total.centre), points.moments, points.centre)
-        points_by_part[points.part] = total._replace(moments=moments)
-    return list(points_by_part.values())
+def _sides_of_parts(group: Group) -> Sequence[Side]:
+    """Return a side for each part, with the moments of all contact points of the part; all sides if moments are symbols."""
+    sides: dict[int, Side] = {}
+    for side in group.sides:
+        if isinstance(side.centre, ca.SX) or isinstance(side.all_moments, ca.SX):
+            return group.sides
+        total = sides.get(side.part, replace(side, all_moments=np.zeros(MOMENTS)))
+        moments = total.all_moments + moments_about(np.asarray(total.centre), side.all_moments, side.centre)
+        sides[side.part] = replace(total, all_moments=moments)
+    return list(sides.values())
 
 
-def _points_of_side(side: Side) -> _PartPoints:
-    return _PartPoints(side.part, side.centre, side.all_moments)
-
-
-def _displaced(system: GroupEquations, points: _PartPoints, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
-    """Return the displacement energy of points, relative to the free part that their part is located on, if any."""
-    group, (part, centre, moments) = system.group, points
+def _displaced(system: GroupEquations, side: Side, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
+    """Return the displacement energy of all points, relative to the free part that their part is located on, if any."""
+    group, part, centre, moments = system.group, side.part, side.centre, ca.SX(side.all_moments)
     supporting = group.mobilities[part].movers[:-1]
     if not supporting:
-        return displacement_energy(ca.SX(moments), centre, start[part], end[part])
+        return displacement_energy(moments, centre, start[part], end[part])
     support = group.position(group.free[supporting[-1]])
     end_relative = system.linear(relative(end[part], end[support]))
-    return displacement_energy(ca.SX(moments), centre, relative(start[part], start[support]), end_relative)
+    return displacement_energy(moments, centre, relative(start[part], start[support]), end_relative)
