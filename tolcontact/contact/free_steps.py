@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Bool, Float
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.contact.acceptance import AcceptanceLimits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.fixed_search import Search
@@ -22,6 +23,24 @@ TOUCHING = 1e-9  # mm: bodies with at most this penetration touch
 GAIN_SHARE = 1e-9  # of the objective: increase due to rounding
 MAX_LIFTS = 30
 LIFT_FACTOR = 1.1  # times the width of the common region of bodies: how far they are moved apart
+MAX_TRIALS = 64  # poses that are tried at once
+
+
+class _StepLimits(NamedTuple):
+    """Limits of steps (n,), and how large these are.
+
+    are_free    whether bodies do not interfere before the step
+    objective   of which a shorter step may not have more
+    depths      [mm] of places before the step
+    motions     [mm]: how far contact points move
+    sizes       [mm]
+    """
+
+    are_free: Bool[Array, " n"]
+    objective: Float[Array, " n"]
+    depths: Float[Array, " n"]
+    motions: Float[Array, " n"]
+    sizes: Float[Array, " n"]
 
 
 class FreeSteps:
@@ -62,32 +81,71 @@ class FreeSteps:
 
     def _hold_back(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> Bool[Array, " n"]:
         """Halve steps until no body penetrates another one and the objective is lower; return which are short (n,)."""
-        shares = np.ones(len(task))
+        task = replace(task, scans=())  # which are of the places before the step
+        limits, halvings = self._limits_of(task, before, state, size), np.zeros(len(task), dtype=int)
         rows = np.flatnonzero(np.isfinite(before.poses).all(axis=(1, 2)) & np.isfinite(state.poses).all(axis=(1, 2)))
-        depths = self._depths(task, before.relative, np.full(len(task), self._candidates.free_depth))
-        enters = ~self._candidates.interfere(before.relative)
-        objective = self._energy(task, before) * (1 + GAIN_SHARE)
-        objective[(depths > TOUCHING) | ~enters] = np.inf
-        motions = self._limits.displacement(before.poses, state.poses)
-        for _ in range(MAX_HALVINGS):
-            part, share = task.take(rows), shares[rows]
-            fails = enters[rows] & self._candidates.interfere(state.relative[rows])
-            fails |= self._energy(part, state.take(rows)) > objective[rows]
-            # Places deeper than the motion of the bodies are on the far side of a body. They take longest to find.
-            left = np.flatnonzero(~fails)
-            shown, share = rows[left], share[left]
-            depth = self._depths(task.take(shown), state.relative[shown], depths[shown] + share * motions[shown] + TOUCHING)
-            fails[left] = depth > TOUCHING + depths[shown] * (1 - share) + SINK_SHARE * share * size[shown]
-            rows, part = rows[fails], part.take(fails)
-            if not rows.size:
+        trials, poses, relative = np.zeros(1, dtype=int), state.poses[rows][:, None], state.relative[rows][:, None]
+        while rows.size:
+            fails = self._fail(task, state, limits, rows, trials, poses, relative)
+            picks = np.where(fails.all(axis=1), len(trials) - 1, fails.argmin(axis=1))
+            picked = np.arange(len(rows)), picks
+            state.poses[rows], state.relative[rows], halvings[rows] = poses[picked], relative[picked], trials[picks]
+            rows = rows[fails[picked]]
+            if trials[-1] == MAX_HALVINGS or not rows.size:
                 break
-            shares[rows] /= 2
-            state.poses[rows] = _halfway(before.poses[rows], state.poses[rows], self._centres)
-            state.relative[rows] = self._relate(poses=state.poses[rows], deviations=part.deviations)
-        # Places show penetration after small motions of the bodies, unless only the complete test detects it.
-        rows = rows[enters[rows] & self._candidates.interfere(state.relative[rows])]
+            # Several shares of a few steps are tried at once, since this takes hardly longer than to try one of them.
+            count = min(2 * len(trials), max(MAX_TRIALS // len(rows), 1), MAX_HALVINGS - trials[-1])
+            trials = trials[-1] + 1 + np.arange(count)
+            poses = self._halved(before.poses[rows], state.poses[rows], count)
+            deviations = np.repeat(task.deviations[rows], count, axis=0)
+            relative = self._relate(poses=poses.reshape(-1, *poses.shape[2:]), deviations=deviations)
+            relative = relative.reshape(len(rows), count, *relative.shape[1:])
         state.poses[rows], state.relative[rows] = before.poses[rows], before.relative[rows]
-        return shares < 1
+        return halvings > 0
+
+    def _limits_of(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> _StepLimits:
+        """Return the limits of steps from `before` to `state`."""
+        depths = self._depths(task.deviations, before.relative, np.full(len(task), self._candidates.free_depth))
+        is_free = ~self._candidates.interfere(before.relative)
+        objective = self._energy(task, before) * (1 + GAIN_SHARE)
+        objective[(depths > TOUCHING) | ~is_free] = np.inf
+        return _StepLimits(is_free, objective, depths, self._limits.displacement(before.poses, state.poses), size)
+
+    def _fail(
+        self,
+        task: Task,
+        state: State,
+        limits: _StepLimits,
+        rows: Int[Array, " k"],
+        halvings: Int[Array, " trial"],
+        poses: Float[Array, "k trial part 12"],
+        relative: Float[Array, "k trial pair 12"],
+    ) -> Bool[Array, "k trial"]:
+        """Return whether steps of some realizations, at the poses after some `halvings`, are too long (k, trial)."""
+        tried = np.repeat(rows, len(halvings))
+        share = np.tile(0.5**halvings, len(rows))
+        poses, relative = (values.reshape(-1, *values.shape[2:]) for values in (poses, relative))
+        fails = limits.are_free[tried] & self._candidates.interfere(relative)
+        # Places show penetration after small motions of the bodies, unless only the complete test detects it.
+        shown = np.flatnonzero(~fails & (share > 0.5**MAX_HALVINGS))
+        shortened = replace(state.take(tried[shown]), poses=poses[shown], relative=relative[shown])
+        fails[shown] = self._energy(task.take(tried[shown]), shortened) > limits.objective[tried[shown]]
+        # Places deeper than the motion of the bodies are on the far side of a body. They take longest to find.
+        shown = shown[~fails[shown]]
+        one, part = share[shown], tried[shown]
+        deepest = limits.depths[part] + one * limits.motions[part] + TOUCHING
+        depths = self._depths(task.deviations[part], relative[shown], deepest)
+        fails[shown] = depths > TOUCHING + limits.depths[part] * (1 - one) + SINK_SHARE * one * limits.sizes[part]
+        return fails.reshape(len(rows), -1)
+
+    def _halved(
+        self, first: Float[Array, "k part 12"], second: Float[Array, "k part 12"], count: int
+    ) -> Float[Array, "k trial part 12"]:
+        """Return poses after 1 to `count` halvings of steps from one pose to another."""
+        halved = [second]
+        for _ in range(count):
+            halved.append(_halfway(first, halved[-1], self._centres))
+        return np.stack(halved[1:], axis=1)
 
     def lift(
         self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], deviations: Float[Array, "n contributor"]
@@ -116,10 +174,10 @@ class FreeSteps:
                 break
         return poses, relative
 
-    def _depths(self, task: Task, relative: np.ndarray, deepest: np.ndarray) -> np.ndarray:
+    def _depths(self, deviations: np.ndarray, relative: np.ndarray, deepest: np.ndarray) -> np.ndarray:
         """Return the largest penetration (n,) [mm] of the places that are not deeper than `deepest` (n,) [mm]."""
-        scans = self._candidates.scans(relative, task.deviations, Search(FREE_WHERE_RAW, deepest=deepest))
-        return np.maximum(-min_gaps(scans, relative, task.deviations).min(axis=1), 0)
+        scans = self._candidates.scans(relative, deviations, Search(FREE_WHERE_RAW, deepest=deepest))
+        return np.maximum(-min_gaps(scans, relative, deviations).min(axis=1), 0)
 
 
 def _halfway(
