@@ -52,9 +52,10 @@ def moot_corners(A: Polyhedron, B: Polyhedron, facets: Int[Array, "plane 2"], ta
         is_engaged = np.zeros(len(body.vertices), dtype=bool)
         is_engaged[numbers[is_other & (kinds == kind)]] = True
         is_engaged[body.ends[numbers[is_other & (kinds == EDGE_ON_EDGE)]]] = True
-        for plane, facet in enumerate(facets[:, side]):
+        reflex = {facet: _reflex_corners(body, facet) & ~is_engaged for facet in set(facets[:, side].tolist())}
+        for plane, facet in enumerate(facets[:, side].tolist()):
             of_plane = np.flatnonzero((planes == plane) & (kinds == kind))
-            moot[of_plane] = (_reflex_corners(body, facet) & ~is_engaged)[numbers[of_plane]]
+            moot[of_plane] = reflex[facet][numbers[of_plane]]
     return moot
 
 

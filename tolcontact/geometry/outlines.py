@@ -46,14 +46,14 @@ def hole_clearances(
     outlines   of the plane of A and of the plane of B, for each pair of facing planes in turn
     """
     clearances = np.zeros((len(A.edges), len(facing)))
-    for plane, facets in enumerate(facing):
-        normals = A.normals[facets[0]], B.normals[facets[1]]
-        frame = across(normals[1])
-        loops, are_holes = [], list[bool]()
-        for segments, normal in zip(outlines[2 * plane : 2 * plane + 2], normals, strict=True):
-            of_body = _loops(segments)
-            loops += of_body
-            are_holes += [_is_hole(loop, normal) for loop in of_body]
+    known: tuple[dict[int, list[np.ndarray]], ...] = {}, {}  # the loops of planes, of which many may face the same one
+    for plane, facets in enumerate(facing.tolist()):
+        frame, loops, are_holes = across(B.normals[facets[1]]), list[np.ndarray](), list[bool]()
+        for body, of_planes, facet, segments in zip((A, B), known, facets, outlines[2 * plane : 2 * plane + 2], strict=True):
+            if facet not in of_planes:
+                of_planes[facet] = _loops(segments)
+            loops += of_planes[facet]
+            are_holes += [_is_hole(loop, body.normals[facet]) for loop in of_planes[facet]]
         for k, clearance in _holes([loop @ frame.T for loop in loops], are_holes).items():
             points = {tuple(point) for point in loops[k].reshape(-1, 3).tolist()}
             clearances[[all(tuple(end) in points for end in edge) for edge in A.edges.tolist()], plane] = clearance

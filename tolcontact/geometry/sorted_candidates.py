@@ -23,7 +23,8 @@ def sorted_candidates(
     kinds, firsts, seconds, planes = table.T
     frames = np.array([[across(body.normals[k]) for body, k in zip((A, B), facets, strict=True)] for facets in facing])
     frames = frames.reshape(-1, 2, 2, 3)
-    in_space = [outline(body, k) for facets in facing for body, k in zip((A, B), facets, strict=True)]
+    known = [{k: outline(body, k) for k in set(facets.tolist())} for body, facets in zip((A, B), facing.T, strict=True)]
+    in_space = [of_body[k] for facets in facing.tolist() for of_body, k in zip(known, facets, strict=True)]
     outlines = [segments @ frame.T for segments, frame in zip(in_space, frames.reshape(-1, 2, 3), strict=True)]
     boxes = np.tile([-np.inf, -np.inf, np.inf, np.inf], (len(table), 1))
     for plane in range(len(facing)):
