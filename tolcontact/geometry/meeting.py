@@ -88,6 +88,7 @@ class Meeting:
     has_form whether faces have form, so that planes may touch first at any of their corners
     is_free  whether bodies are free, so that no contact point is behind another one
     slope    length from which the slope of a gap between rims counts, and not the normal of the plane, whose length is 1
+    original the meeting that has the same candidates, if this one differs from it in what counts
     """
 
     moving: Polyhedron
@@ -99,18 +100,19 @@ class Meeting:
     overhang: float = field(default=0.0, kw_only=True)
     is_free: bool = field(default=False, kw_only=True)
     slope: float = field(default=MIN_SLOPE, kw_only=True)
+    original: "Meeting | None" = field(default=None, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.candidates.kinds)
 
     def of_free_bodies(self, overhang: float = 0.0) -> "Meeting":
         """Return the same candidates for bodies that are free; they count up to `overhang` [mm] outside their edges."""
-        return replace(self, overhang=overhang, is_free=True)
+        return replace(self, overhang=overhang, is_free=True, original=self)
 
     @cached_property
     def sloped(self) -> "Meeting":
         """The same candidates; those where rims of facing planes cross have the slope of their gap as normals."""
-        return replace(self, slope=1.0)
+        return replace(self, slope=1.0, original=self)
 
     def slants(self, X_RM: Float[Array, "n 12"], labels: Int[Array, " n"]) -> Float[Array, " n"]:
         """Return the tangents of the angles between slopes of gaps and the normals that rows have instead, at poses (n, 12).
@@ -142,6 +144,10 @@ class Meeting:
     @cached_property
     def extended(self) -> "Meeting | None":
         """The meeting for bodies that are further apart; None if its travel has no bound, or if it has too many candidates."""
+        if self.original is not None:
+            extended = self.original.extended
+            choices = {"overhang": self.overhang, "is_free": self.is_free, "slope": self.slope}
+            return None if extended is None else replace(extended, original=extended, **choices)
         if self.reach.travel > MAX_TRAVEL * self.size:
             return None
         travel, tilt = EXTENSION_FACTOR * self.reach.travel, EXTENSION_FACTOR * (self.reach.tilt + TILT_MARGIN)
