@@ -146,8 +146,9 @@ class Meeting:
         """The meeting for bodies that are further apart; None if its travel has no bound, or if it has too many candidates."""
         if self.original is not None:
             extended = self.original.extended
-            choices = {"overhang": self.overhang, "is_free": self.is_free, "slope": self.slope}
-            return None if extended is None else replace(extended, original=extended, **choices)
+            if extended is None:
+                return None
+            return replace(extended, overhang=self.overhang, is_free=self.is_free, slope=self.slope, original=extended)
         if self.reach.travel > MAX_TRAVEL * self.size:
             return None
         travel, tilt = EXTENSION_FACTOR * self.reach.travel, EXTENSION_FACTOR * (self.reach.tilt + TILT_MARGIN)
