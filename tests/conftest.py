@@ -10,8 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import jaxtyping
 import pytest
-from jaxtyping import config, install_import_hook
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as a command does; it reaches the workers of xdist
 PACKAGE = Path(__file__).resolve().parents[1] / "tolcontact"
@@ -27,7 +27,7 @@ CHECKED = [
     # Numba compiles no function that something is wrapped around.
     if file.name != "__init__.py" and not file.name.endswith("kernel.py")
 ]
-install_import_hook(CHECKED, "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))")
+CHECKER = "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))"
 # Modules whose tests call the functions of these rooms in every way: flat, round and springy contact, stations, form.
 CHECKING = {
     f"test_{name}"
@@ -36,6 +36,27 @@ CHECKING = {
         "other_starts", "round_contact", "round_objective", "seating", "springs", "stations", "threads",
     )
 }  # fmt: skip
+WITH_SHAPES, WITHOUT_SHAPES = "shapes", "others"
+
+
+def pytest_addoption(parser):
+    parser.addoption("--nightly", action="store_true", help="run the tests marked nightly too")
+    steps, told = (WITH_SHAPES, WITHOUT_SHAPES), "run tests/units and modules that check the shapes of arrays, or all others"
+    parser.addoption("--step", choices=steps, help=told)
+
+
+def pytest_configure(config):
+    """Have functions check shapes; decorating all of them takes a while, which no process needs that checks none."""
+    if config.getoption("step") != WITHOUT_SHAPES:
+        jaxtyping.install_import_hook(CHECKED, CHECKER)
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Collect only what is of the chosen step."""
+    if (step := config.getoption("step")) is None or collection_path.suffix != ".py":
+        return None
+    checks = collection_path.stem in CHECKING or "units" in collection_path.relative_to(config.rootpath).parts
+    return True if checks != (step == WITH_SHAPES) else None
 
 
 def pytest_collection_finish():
@@ -67,10 +88,6 @@ def _freed_memory():
         with contextlib.suppress(OSError, AttributeError):  # the C library may be another one
             ctypes.CDLL(None).malloc_trim(0)
         _memory[0] = _memory_in_use() or 0
-
-
-def pytest_addoption(parser):
-    parser.addoption("--nightly", action="store_true", help="run the tests marked nightly too")
 
 
 def pytest_collection_modifyitems(config, items):
@@ -123,9 +140,9 @@ def forked_reader():
 def shapes_are_checked(request):
     """Checking takes half as long again where there are many small calls: not in slow tests, nor in other modules."""
     checks = request.module.__name__.rpartition(".")[2] in CHECKING and not request.node.get_closest_marker("slow")
-    config.update("jaxtyping_disable", not checks)
+    jaxtyping.config.update("jaxtyping_disable", not checks)
     yield
-    config.update("jaxtyping_disable", False)
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.fixture
