@@ -41,7 +41,7 @@ def apart(by: float, angle: float = 0.0, hole: int = 0, **halves: float) -> dict
 
 
 def run(a: tc.Assembly, **options):
-    return tc.run(a, solver="daqp", fields="none", surfaces=0, **options)
+    return tc.run(compiled(a, solver="daqp"), fields="none", surfaces=0, **options)
 
 
 def test_one_floating_fastener_passes_up_to_the_formula():
@@ -110,7 +110,7 @@ def test_the_share_that_does_not_fit_is_that_of_the_closed_form(into, width):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("samples", [60, *nightly(300)])
+@pytest.mark.parametrize("samples", [20, *nightly(300)])
 def test_a_bolt_lets_a_cover_shift_by_both_clearances(samples):
     a = bolted([(0, 0)], method=SEATED, position=(0.3, 0), size=0.1, shank=tc.Size(10, 0.0, -0.1))
     cover = a.parts[1]
@@ -151,7 +151,7 @@ def test_four_fasteners_go_in_if_a_linear_program_finds_a_place_for_the_cover(in
     """Shift and turn of the cover, to first order, so that each pair of holes is off by no more than its clearances."""
     shank = 10.0 if into else tc.Size(10, 0.0, -0.1)
     a = bolted(FOUR, into=into, position=(1.3, 1.3) if into else (3.0, 3.0), size=0.1, shank=shank)
-    results = run(a, samples=200 if into else 40)
+    results = run(a, samples=80 if into else 40)
     off = shifts(results, "cover", 4) - shifts(results, "base", 4)
     room = 0.5 + grown(results, "cover", 4) / 2
     if not into:
@@ -226,7 +226,7 @@ def test_a_part_that_stands_in_its_holes_can_be_a_fastener(head):
         assert tc.fasten(a, f"dowel {k}", shank, through=[hole(cover, f"H{k}", (x, 0))], into=pressed) is dowel
         for axis in "xy":
             a.measure(f"{axis}{k}", pressed.axis(1), to=dowel.point(0, 0, -8), along=axis)
-    results = run(a, samples=50)
+    results = run(a, samples=20)
     assert_resolved(results)
     assert np.abs(results.measured - results.measured[0, 0]).max() < 1e-9  # a dowel goes where its hole is
     assert (results.gap_min.sel(state="raw").min("realization") < -0.001).sum() == 0
@@ -269,7 +269,7 @@ def nominal_warnings(a: tc.Assembly) -> list[str]:
     return [str(warning.message) for warning in caught if issubclass(warning.category, tc.NominalWarning)]
 
 
-@pytest.mark.parametrize("frame", [STILL, MOVED], ids=["still", "moved"])
+@pytest.mark.parametrize("frame", [MOVED, *nightly(STILL)], ids=["moved", "still"])
 def test_a_screw_may_be_thicker_than_its_thread_and_nowhere_else(frame):
     a = bolted([(-45.0, 0.0), (45.0, 0.0)], into=True, frame=frame)
     assert nominal_warnings(a) == []
@@ -278,7 +278,9 @@ def test_a_screw_may_be_thicker_than_its_thread_and_nowhere_else(frame):
     assert re.match(r'\[overlap\] part "b.*it overlaps part "b.* by about', text)
 
 
-@pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0, 1.57079632679), (1.57079632679, 0, 0), (0, 1.57079632679, 1e-13)])
+@pytest.mark.parametrize(
+    "turn", [(0, 1.57079632679, 1e-13), *nightly(((0, 0, 0),), ((0, 0, 1.57079632679),), ((1.57079632679, 0, 0),))]
+)
 def test_locators_of_a_fastener_are_not_taken_for_mistakes(turn):
     """Nor do they depend on rounding in the axis of its hole."""
     frame = Frame(turn=turn, shift=(300, -50, 20))

@@ -13,6 +13,7 @@ from tolcontact.report import summary_text
 from tolcontact.vocabulary import CERTIFIED, Status
 
 HOLE, BOLT, POSITION = 10.6, 10.0, 2.2
+SAMPLES = 12
 SURE = 3e-4  # [mm] of a circle's polygon, and of second order
 
 
@@ -34,7 +35,7 @@ def flange(*, is_pressed: bool) -> tc.Assembly:
 
 def run_and_room(model: tc.Assembly):
     """Return a run, and the room [mm] of each realization in its holes by the linear program; below 0 no bolts go in."""
-    run = tc.run(compiled(model, solver="daqp"), samples=24, seed=1, fields="none", surfaces=0)
+    run = tc.run(compiled(model, solver="daqp"), samples=SAMPLES, seed=1, fields="none", surfaces=0)
     offsets = shifts(run, "cover", 4) - shifts(run, "base", 4)
     return run, np.array([most_room(offset, np.full(4, HOLE - BOLT)) for offset in offsets])
 

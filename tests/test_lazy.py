@@ -10,7 +10,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER, nightly
+from tests.helpers import PAPER, compiled, nightly
 
 
 def rows_of(results, name):
@@ -21,7 +21,7 @@ def rows_of(results, name):
 @pytest.mark.parametrize(
     ("name", "samples", "options"),
     [
-        ("stack", 3000, {"solver": "daqp", "method": {"resolution": "exact"}}),
+        ("stack", 1500, {"solver": "daqp", "method": {"resolution": "exact"}}),
         *nightly(("ra1", 40_000, {"solver": "qpoases"}), ("spindle", 513, {"solver": "daqp"})),
     ],
 )
@@ -53,7 +53,7 @@ def test_a_model_without_contact():
 
 @pytest.mark.slow
 def test_deviations_of_ones_own():
-    program = tc.build(cases.ra1(), solver="daqp")
+    program = compiled(cases.ra1(), solver="daqp")
     labels = list(program.nominal.contributors)
     drawn = tc.run(program, samples=500, seed=4, surfaces=0, fields="none")
     mixed = (
@@ -95,7 +95,7 @@ def test_what_is_no_number_of_realizations():
 
 
 def test_deviations_of_unknown_or_repeated_contributors():
-    labels = list(tc.build(cases.ra1()).nominal.contributors)
+    labels = list(compiled(cases.ra1()).nominal.contributors)
     for wrong in ([*labels[:-1], "nobody"], [*labels, labels[0]]):
         array = xr.DataArray(np.zeros((2, len(wrong))), {"contributor": wrong}, ("realization", "contributor"))
         with pytest.raises(tc.OptionError, match=r'deviations of "(nobody|base\.A1)" are missing, unknown, or given twice'):
@@ -111,26 +111,27 @@ def test_without_dask_the_message_says_what_to_install(monkeypatch):
 @pytest.mark.slow
 def test_what_is_written_is_streamed(tmp_path):
     """Netcdf and zarr hold what a run gives, and memory does not grow with their size."""
-    program, own = tc.build(cases.ra1(), solver="daqp", method=PAPER), psutil.Process()
-    some = tc.simulate(program, 40_000, seed=2)[["measured", "status"]]
+    program, own = compiled(cases.ra1(), solver="daqp", method=PAPER), psutil.Process()
+    some = tc.simulate(program, 10_000, seed=2)[["measured", "status"]]
     some.to_netcdf(tmp_path / "some.nc")
     some.to_zarr(tmp_path / "some.zarr")
-    expected = tc.run(program, samples=40_000, seed=2, surfaces=0, fields="none", keep="measures")
+    expected = tc.run(program, samples=10_000, seed=2, surfaces=0, fields="none", keep="measures")
     for found in (xr.open_dataset(tmp_path / "some.nc"), xr.open_zarr(tmp_path / "some.zarr")):
         with found:
             np.testing.assert_array_equal(found.measured, expected.measured)
             assert found.measured.attrs["units"] == "mm" and found.measure.values.tolist() == ["corner height"]
     before = own.memory_info().rss
-    mean = tc.simulate(program, 800_000, seed=2).measured.mean("realization").values  # 450 MB if it were all in memory
-    assert own.memory_info().rss - before < 250e6
+    mean = tc.simulate(program, 300_000, seed=2).measured.mean("realization").values  # 170 MB if it were all in memory
+    assert own.memory_info().rss - before < 90e6
     assert mean[:, 0] == pytest.approx(expected.measured.mean("realization").values[:, 0], abs=0.05)
 
 
 @pytest.mark.slow
 def test_designs_are_one_graph_by_xarray_alone():
     models = {"narrow": cases.one_dimensional(2), "wide": cases.one_dimensional(6), "stack": cases.stack()}
-    designs = {(n, r, s): (n, {"resolution": r}, s) for n in models for r in ("linearized", "exact") for s in (1, 7)}
-    alone = [tc.simulate(models[n], 300, seed=s, method=method, solver="daqp") for n, method, s in designs.values()]
+    designs = [(n, r, s) for n in models for r in ("linearized", "exact") for s in (1, 7)]
+    programs = {(n, r): compiled(models[n], solver="daqp", method={"resolution": r}) for n, r, _ in designs}
+    alone = [tc.simulate(programs[n, r], 100, seed=s) for n, r, s in designs]
     names = xr.Variable("design", [", ".join(map(str, design)) for design in designs])
     found = xr.concat(alone, names, join="outer", combine_attrs="drop_conflicts")
     assert found.measured.dims == ("design", "realization", "state", "measure") and found.sizes["design"] == 12
@@ -147,7 +148,7 @@ def test_designs_are_one_graph_by_xarray_alone():
     ("model", "options", "said"),
     [
         (cases.ra1, {"method": "exact"}, "method is 'exact'; expected a tc.Method, or some of its choices"),
-        (lambda: tc.build(cases.ra1()), {"solver": "daqp"}, "a Program has its solver and method"),
+        (lambda: compiled(cases.ra1()), {"solver": "daqp"}, "a Program has its solver and method"),
     ],
 )
 def test_a_lazy_run_refuses_what_a_run_refuses(model, options, said):

@@ -153,7 +153,7 @@ def twins(group, plane, folder):
 )
 def test_equal_deviations_give_mirrored_measures(group, plane, tmp_path):
     method = SEATED if group in (Fastened, Bent) else None
-    _, run = simulate(twins(group, plane, tmp_path), samples=12, method=method)
+    _, run = simulate(twins(group, plane, tmp_path), samples=6, method=method)
     left, right = np.split(run["measured"], 2, axis=2)
     assert (run["status"] == 1).any() and np.abs(left[:, 1] - left[:, 0]).max() > 1e-3
     np.testing.assert_allclose(right[:, 0], left[:, 0], atol=1e-9)

@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import R_t, simulate
+from tests.helpers import R_t, compiled, simulate
 from tolcontact.vocabulary import CORRECTED, Status
 
 EXACT = tc.Method(resolution="exact")
@@ -40,7 +40,7 @@ def peg(*size: tc.Size) -> tc.Assembly:
 @pytest.mark.filterwarnings("ignore")
 def test_a_peg_that_rolled_into_the_wall_is_looked_for_again_with_points_projected_anew():
     """Along planes at fixed points it rolls into the wall. In the end it touches where the force points to."""
-    _, run = simulate(peg(), samples=6, solver="daqp", method=SEATED)
+    _, run = simulate(peg(), samples=3, solver="daqp", method=SEATED)
     assert (run["status"] == Status.RESOLVED).all()
     assert (run["starts"] >= 2).all() and (run["searched"] == 1).all()
     _, t = R_t(run["poses"][:, CORRECTED])
@@ -54,7 +54,7 @@ def test_a_peg_that_rolled_into_the_wall_is_looked_for_again_with_points_project
 @pytest.mark.filterwarnings("ignore")
 def test_points_that_are_projected_anew_stand_on_the_face_as_it_came_out():
     """The hole is larger by its size deviation: by half of it the peg goes farther, and touches."""
-    _, run = simulate(peg(tc.Size(10 + 2 * FIT, 2e-4, 0)), samples=6, solver="daqp", method=SEATED)
+    _, run = simulate(peg(tc.Size(10 + 2 * FIT, 2e-4, 0)), samples=3, solver="daqp", method=SEATED)
     assert (run["status"] == Status.RESOLVED).all() and (run["searched"] == 1).all()
     _, t = R_t(run["poses"][:, CORRECTED])
     apart = np.linalg.norm((t[:, 1] - t[:, 0])[:, :2], axis=1)
@@ -90,11 +90,11 @@ def test_a_shaft_whose_spin_nothing_holds_comes_to_rest_in_a_lobed_bore():
     a.contact("fit", moving=shaft.face(tc.select.Cylinder()), reference=bore)
     a.force("weight", at=shaft.point(0, 0, 0), vector=(0, -50, 0))
     a.measure("y", shaft.point(0, 0, 0), along="y")
-    program, run = simulate(a, samples=40, seed=2, solver="daqp", method=SEATED)
+    program, run = simulate(a, samples=20, seed=2, solver="daqp", method=SEATED)
     assert (run["status"] == Status.RESOLVED).all()
     assert (run["starts"] == 2).sum() >= 5 and not run["searched"].any()
     (pair,) = program.nominal.pairs
-    everywhere = np.broadcast_to(np.arange(len(pair.P_m)), (40, len(pair.P_m)))
+    everywhere = np.broadcast_to(np.arange(len(pair.P_m)), (20, len(pair.P_m)))
     clearances = ((pair.P_m - pair.P_r) * pair.n_r).sum(axis=1) - pair.offsets.heights(run["deviations"], everywhere)
     lowest = [linprog([0, 1], A_ub=-pair.n_r[:, :2], b_ub=c, bounds=[(None, None)] * 2).fun for c in clearances]
     assert run["measured"][:, CORRECTED, 0] == pytest.approx(np.array(lowest), abs=1e-9)
@@ -116,6 +116,6 @@ def plates_with_a_cap(x, y):
 def test_a_cap_on_the_middle_of_the_web_is_seen_apart_from_the_outer_plate():
     """One of the half-spaces between them excludes no triangle that another one does not exclude by more."""
     a = plates_with_a_cap(40, -10)
-    program = tc.build(a, solver="daqp", method=EXACT)
+    program = compiled(a, solver="daqp", method=EXACT)
     poses = program.place(deviations=np.zeros((1, len(program.nominal.contributors))))["poses"].reshape(1, 3, 12)
     assert not list(program.watch.clashes(poses, np.zeros((1, len(program.nominal.contributors)))))

@@ -16,7 +16,7 @@ from tests.cases import ends, fastened, fits, floating, frames, laps, measured, 
 from tests.helpers import ALL_POINTS, EXACT, PAPER, SEATED, assert_same_archive, compiled, joined, nightly
 from tolcontact.testing import assert_datums_recompute, assert_gaps_recompute
 
-SAMPLES, SEED = 24, 5
+SAMPLES, SEED = 12, 5
 SCENES = {
     "ra1, linearized": (cases.ra1, PAPER),
     "stack": (cases.stack, EXACT),
@@ -54,7 +54,7 @@ class Scene:
         self.program, self.path = self.compiled(model), folder / "run.nc"
         self.run(out=self.path).close()
         self.results = xr.load_datatree(self.path)
-        self.block = joined(tc.simulate_blocks(self.program, samples=SAMPLES, seed=SEED, block=7, threads=2))
+        self.block = joined(tc.simulate_blocks(self.program, samples=SAMPLES, seed=SEED, block=5, threads=2))
         # What a user's function computes turns with nothing.
         self.fixed_in_space = [measure.name for measure in model.measures if callable(measure.of)]
 
@@ -87,7 +87,7 @@ def test_neither_blocks_nor_threads_nor_the_problem_before_change_a_bit(scene):
 
 
 def test_a_run_that_stopped_goes_on_to_the_same_archive(scene, tmp_path):
-    for samples in (10, SAMPLES):
+    for samples in (5, SAMPLES):
         scene.run(samples, out=tmp_path / "grown.nc", resume=samples == SAMPLES).close()
     assert_same_archive(tmp_path / "grown.nc", scene.path)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tolcontact as tc
+from tests.helpers import compiled, nightly
 from tolcontact.vocabulary import OUTSIDE
 
 
@@ -25,10 +26,11 @@ def block(units="mm", angle=None):
     return a
 
 
-@pytest.mark.parametrize("units", ["in", "um"])
+@pytest.mark.parametrize("units", ["in", *nightly("um")])
 def test_values_limits_and_shares_are_those_of_mm_in_other_units(units, tmp_path):
     factor = np.array([tc.declaration.UNITS[units]] * 5 + [np.pi / 180, 1.0])
-    expected, found = (tc.run(block(*given), samples=300, solver="daqp") for given in ((), (units, "deg")))
+    programs = [compiled(block(*given), solver="daqp") for given in ((), (units, "deg"))]
+    expected, found = (tc.run(program, samples=300, surfaces=0, fields="none") for program in programs)
     assert found["measure_units"].values.tolist() == [units] * 5 + ["deg", "mm"]
     np.testing.assert_allclose(found["measured"].values * factor, expected["measured"].values, rtol=0, atol=1e-12)
     shares = [tc.summarize(run)["statistic_value"].sel(statistic=OUTSIDE).values for run in (found, expected)]
@@ -36,7 +38,7 @@ def test_values_limits_and_shares_are_those_of_mm_in_other_units(units, tmp_path
     tc.io.write_model(block(units, "deg"), tmp_path / "model.json")
     with tc.run(tmp_path / "model.json", samples=300, solver="daqp") as again:
         np.testing.assert_array_equal(again["measured"], found["measured"])
-    worst = [tc.analyses.worst_case(block(*given), solver="daqp")["worst"].values for given in ((), (units, "deg"))]
+    worst = [tc.analyses.worst_case(program)["worst"].values for program in programs]
     np.testing.assert_allclose(worst[1] * factor[:, None, None], worst[0], rtol=1e-6, atol=1e-6)
 
 

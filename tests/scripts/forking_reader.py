@@ -3,18 +3,29 @@
 A line is a JSON list: the folder to run in, the file and its arguments.
 """
 
+import functools
 import json
 import os
-import runpy
 import sys
 import tempfile
+from pathlib import Path
 
 import netCDF4  # noqa: F401 (imported once, for all)
 
 from tolcontact import vocabulary  # noqa: F401
 
+
+@functools.cache
+def code_of(path):
+    """The code of a file. What it imports is imported once, for all."""
+    code = compile(Path(path).read_bytes(), path, "exec")
+    exec(code, {"__name__": "imported", "__file__": path})
+    return code
+
+
 for line in sys.stdin:
     folder, *arguments = json.loads(line)
+    code_of(arguments[0])
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = os.fork()
         if process == 0:
@@ -22,7 +33,7 @@ for line in sys.stdin:
             os.dup2(err.fileno(), 2)
             os.chdir(folder)
             sys.argv = arguments
-            runpy.run_path(arguments[0], run_name="__main__")
+            exec(code_of(arguments[0]), {"__name__": "__main__", "__file__": arguments[0]})
             sys.stdout.flush()
             os._exit(0)
         code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
