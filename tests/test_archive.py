@@ -26,7 +26,9 @@ def program():
 @pytest.mark.parametrize("search", ["fixed", "bounded"])
 def test_it_is_read_with_xarray_alone_and_recomputes_its_own_gaps(search, tmp_path):
     path = tmp_path / "stack.nc"
-    tc.run(compiled(cases.stack(), solver="daqp", method=tc.Method(search=search)), samples=60, seed=3, out=path).close()
+    tc.run(
+        compiled(cases.stack(), solver="daqp", method=tc.Method(search=search)), samples=60, seed=3, out=path, surfaces=4
+    ).close()
     done = run([sys.executable, "-I", SCRIPTS / "read_plainly.py", path])
     assert done.returncode == 0 and len(done.stdout.split()) == 60, done.stderr
     assert_gaps_recompute(path)

@@ -20,6 +20,7 @@ from tests.cases.measured import (
     shaft,
     two,
 )
+from tests.helpers import compiled
 
 
 @pytest.mark.parametrize("turn", [0.3, 0.0, 1e-10, 1e-7, np.pi / 2])
@@ -92,4 +93,4 @@ def test_angles_of_planes_and_axes(turn):
     azimuths = [np.arctan2(w @ np.cross(n, [1, 0, 0]), w @ [1, 0, 0]) for w in flat]
     difference = (azimuths[1] - azimuths[0] - found[:, 1] + np.pi / 2) % np.pi - np.pi / 2
     np.testing.assert_allclose(difference, 0, atol=1e-9)
-    assert np.abs(tc.build(assembly).nominal_measures).max() <= np.pi / 2 + 1e-9
+    assert np.abs(compiled(assembly).nominal_measures).max() <= np.pi / 2 + 1e-9

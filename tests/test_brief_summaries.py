@@ -43,7 +43,7 @@ def printed(summary, width=80, **options):
 
 
 def test_many_measurements_are_shortened_to_those_that_fall_short(tmp_path):
-    tc.run(many_gaps(), samples=2000, seed=1, out=tmp_path / "gaps.nc")
+    tc.run(compiled(many_gaps()), samples=2000, seed=1, out=tmp_path / "gaps.nc")
     summary = tc.summarize(tmp_path / "gaps.nc")
     (brief, line), (whole, _) = printed(summary), printed(summary, is_whole=True)
     assert [f"gap {k}" in brief for k in range(COUNT)] == [False] * 7 + [True] * 2
@@ -58,12 +58,15 @@ def test_many_measurements_are_shortened_to_those_that_fall_short(tmp_path):
 
 def test_undecided_measurements_and_those_that_are_no_numbers_are_not_hidden():
     """Twenty realizations leave six of the gaps undecided; the root of a negative height is no number."""
-    assert "2 more undecided, 1 more without limits; " in printed(tc.summarize(tc.run(many_gaps(), samples=20, seed=1)))[1]
+    assert (
+        "2 more undecided, 1 more without limits; "
+        in printed(tc.summarize(tc.run(compiled(many_gaps()), samples=20, seed=1)))[1]
+    )
     a = many_parts()
     for k in range(COUNT):
         a.measure(f"place {k}", a.parts[1].point(k, 0, 0), along="z")
     a.measure("root", lambda poses: ca.sqrt(poses.position(a.parts[1].point(5, 5, 10))[0] - 5))
-    text = printed(tc.summarize(tc.run(a, samples=20, seed=1)))[1]
+    text = printed(tc.summarize(tc.run(compiled(a), samples=20, seed=1, surfaces=0)))[1]
     assert "root: not a number" in text and "place 0" not in text and f"{COUNT + 1} more without limits" in text
 
 
@@ -86,13 +89,13 @@ def test_what_is_no_number_is_not_among_what_falls_short():
 @pytest.mark.parametrize("width", [100, 80])
 def test_no_column_of_a_terminal_is_cut(width, tmp_path):
     """Means of many digits have their interval on two lines, so that the share out of specification stays in view."""
-    text, line = printed(tc.summarize(tc.run(many_gaps(), samples=300, seed=1)), width)
+    text, line = printed(tc.summarize(tc.run(compiled(many_gaps()), samples=300, seed=1)), width)
     assert "specification" in text and max(map(len, text.splitlines())) <= width
     assert "54 %" in line and "[48," in line and "60]" in line
 
 
 def test_many_parts_and_pairs_are_shortened_to_those_that_move_and_touch_most():
-    summary = tc.summarize(tc.run(many_parts(), samples=40, seed=1, surfaces=0))
+    summary = tc.summarize(tc.run(compiled(many_parts()), samples=40, seed=1, surfaces=0))
     (brief, line), (whole, _) = printed(summary), printed(summary, is_whole=True)
     assert "move most (6 sigma, mm): block 0" in line and line.count("8 more") == 2 and "7 more" in line
     assert "without contact, percentiles, all parts and pairs, other checks: the page has all" in line
@@ -106,7 +109,7 @@ def test_a_long_summary_fits_a_screen_and_names_what_failed():
     for k in range(5):
         a.measure(f"place {k}", a.parts[k + 1].point(0, 0, 0), along="z", limits=(-0.001, 0.001))
     a.part("post", tc.Box(5, 5, 40), at=(40 * (COUNT - 1) + 20.001, 12, 10.5), fixed=True)
-    summary = tc.summarize(tc.run(a, samples=40, seed=1, surfaces=0))
+    summary = tc.summarize(tc.run(compiled(a), samples=40, seed=1, surfaces=0))
     brief, line = printed(summary)
     assert len(brief.splitlines()) <= 50
     assert all(f"place {k}: does not meet its limits" in line for k in range(5)) and "status: " in line

@@ -10,7 +10,7 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import ROOT, call
+from tests.helpers import ROOT, call, compiled
 from tests.shapes import shape
 from tests.step_files import assembly, step_block
 from tolcontact.discretization import discretize
@@ -78,11 +78,11 @@ def test_an_assembly_is_declared_from_its_file_alone(file):
     model.locate(lower, tc.three_two_one(lower.face("-z"), lower.face("-y"), lower.face("-x"), inset=0.5), tolerance=0.1)
     model.contact("seat", moving=upper.face("-z"), reference=lower.face("+z"))
     model.measure("gap", lower.point(2.5, 2.5, 5), to=upper.point(2.5, 2.5, 0), along="z", tolerance=0.3)
-    results = tc.run(model, samples=300, seed=1, solver="daqp", surfaces=16)
+    results = tc.run(compiled(model, solver="daqp"), samples=300, seed=1, surfaces=16)
     assert (results["status"] <= 1).all()
     raw, corrected = (results["measured"].sel(state=state, measure="gap") for state in ("raw", "corrected"))
     assert float(raw.min()) < -0.05 and float(corrected.min()) > -0.005  # points beside each other, faces tilted
-    again = tc.run(tc.io.model_of(results), samples=300, seed=1, solver="daqp", surfaces=0)
+    again = tc.run(compiled(tc.io.model_of(results), solver="daqp"), samples=300, seed=1, surfaces=0)
     assert np.array_equal(again["measured"].values, results["measured"].values)
     assert len(tc.io.parts_from(tc.Assembly("all"), file)) == 5
 

@@ -9,7 +9,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call, nightly, simulate
+from tests.helpers import call, compiled, nightly, simulate
 
 PERCENTS = (0.00135, 0.5, 0.99865)
 
@@ -70,7 +70,7 @@ def test_limits_are_compared_with_the_measure_as_it_is_said(absolute, sides):
     limits = tuple(None if side is None else side + off for side in sides)
     a = stand()
     a.measure("limited", a.parts[0].point(5, 5, 10), along="z", limits=limits, absolute=absolute)
-    summary = tc.summarize(tc.run(a, samples=40_000, seed=3, solver="daqp", surfaces=0, fields="none"))
+    summary = tc.summarize(tc.run(compiled(a, solver="daqp"), samples=40_000, seed=3, surfaces=0, fields="none"))
     of = summary["statistic_value"].sel(measure="limited", state="raw")
     expected = truth(stats.norm(0, 0.1), *(side or far for side, far in zip(sides, (-np.inf, np.inf), strict=True)))
     for word, name in {"below": "below limit", "above": "above limit", "outside": "outside limits", "Ppk": "Ppk"}.items():
@@ -109,7 +109,7 @@ def test_a_function_has_its_own_value():
 def test_limits_come_back_from_an_archive_and_a_document(limits, tmp_path):
     a = stand(limits=limits, absolute=False)
     tc.io.write_model(a, tmp_path / "stand.json")
-    tc.run(a, samples=10, out=tmp_path / "stand.nc").close()
+    tc.run(compiled(a), samples=10, out=tmp_path / "stand.nc").close()
     with tc.open_archive(tmp_path / "stand.nc") as results:
         again = [tc.archive.model_of(results), tc.build(tmp_path / "stand.json").nominal.assembly]
     for model in again:
@@ -120,7 +120,7 @@ def test_limits_come_back_from_an_archive_and_a_document(limits, tmp_path):
 @pytest.mark.slow
 def test_summaries_are_printed_as_json_and_csv(tmp_path):
     path = tmp_path / "stand.nc"
-    tc.run(stand(limits=(None, 0.1)), samples=100, seed=2, out=path).close()
+    tc.run(compiled(stand(limits=(None, 0.1))), samples=100, seed=2, out=path).close()
     expected = tc.summarize(path)["statistic_value"].sel(measure="height", state="raw", statistic="6 sigma").values
     done = call(tmp_path, "summary", path, "--json")
     found = json.loads(done.stdout)

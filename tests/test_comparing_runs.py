@@ -118,7 +118,7 @@ def test_runs_without_a_measure_in_common_are_refused(runs):
     a.locate(block, cases.translating(0.1))
     a.measure("height", block.point(5, 5, 10), along="z")
     with pytest.raises(tc.OptionError, match="share no measurement"):
-        tc.compare_runs({"stack": runs["one"], "alone": tc.run(a, samples=10, surfaces=0)})
+        tc.compare_runs({"stack": runs["one"], "alone": tc.run(compiled(a), samples=10, surfaces=0)})
 
 
 @pytest.mark.slow

@@ -251,5 +251,5 @@ def test_a_cause_is_stepped_with_what_it_drives():
 def test_the_variance_of_a_contributor_is_that_of_its_distribution(tolerance, variance):
     a = shelf({})
     a.variable("v", tolerance, drives={"block.A1": 1.0})
-    contributors = tc.build(a, solver="daqp", method=PAPER).draws.contributors
+    contributors = compiled(a, solver="daqp", method=PAPER).draws.contributors
     assert next(c for c in contributors if c.label == "v").variance == pytest.approx(variance, rel=2e-4)

@@ -12,6 +12,7 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases
 from tests.cases import toleranced
+from tests.helpers import compiled
 from tolcontact.discretization import discretize
 from tolcontact.report import summary_text
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
@@ -89,7 +90,7 @@ def test_coefficients_of_each_kind_have_the_copula_of_their_closed_form(distribu
     assert found["top.A2"] == pytest.approx(expected["top.A2"], abs=1e-6)
     if distribution is LOGNORMAL and kind == "copula":
         assert PEARSON == pytest.approx(0.630, abs=5e-4)
-        program = tc.build(two_supports(distribution, stated, kind), solver="daqp")
+        program = compiled(two_supports(distribution, stated, kind), solver="daqp")
         (line,) = program.draws.in_words
         assert line == 'correlation of "top.A1" and "top.A2": copula 0.700, Pearson 0.630, rank 0.683'
         console = Console(file=io.StringIO(), width=200)
@@ -125,12 +126,12 @@ def test_a_shared_cause_drives_all_that_it_names():
     drawn, alone = draws_of(with_everything()), draws_of(toleranced.block_with("top", tc.Profile(0.3, "A")))
     assert drawn["block.top.offset"] == pytest.approx(alone["block.top.offset"] + 0.002 * drawn["warmth"], abs=1e-15)
     assert np.ptp(drawn["warmth"]) == pytest.approx(20, rel=1e-3)
-    results = tc.run(with_everything(), samples=300)
+    results = tc.run(compiled(with_everything()), samples=300)
     sample = results["sample"].to_dataset()
     assert sample["contributor_units"].sel(contributor="warmth") == "K"
     assert sample["source"].sel(contributor=["block.top.offset", "warmth"]).values.tolist() == ["feature", "variable"]
     assert_gaps_recompute(results)
-    assert_same_run(results, tc.run(tc.io.model_of(results), samples=300))
+    assert_same_run(results, tc.run(compiled(tc.io.model_of(results)), samples=300))
 
 
 @pytest.mark.parametrize("kind", ["frame", "dataset", "csv", "mapping"])
@@ -169,8 +170,8 @@ def test_a_population_is_in_the_archive():
     first = np.random.default_rng(0).normal(size=50) * 0.1
     a = cases.ra1()
     a.population({"one": first, "two": -2 * first + 0.01}, {"top.A1": "one", "top.A2": "two"})
-    results = tc.run(a, samples=100, surfaces=0)
-    assert_same_run(results, tc.run(tc.io.model_of(results), samples=100, surfaces=0))
+    results = tc.run(compiled(a), samples=100, surfaces=0)
+    assert_same_run(results, tc.run(compiled(tc.io.model_of(results)), samples=100, surfaces=0))
 
 
 @pytest.mark.parametrize(

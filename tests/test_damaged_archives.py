@@ -10,7 +10,7 @@ import xarray as xr
 
 import tolcontact as tc
 from models import ra1
-from tests.helpers import COMMAND, call, model_in, nightly, posix_only, run, script
+from tests.helpers import COMMAND, PAPER, call, compiled, model_in, nightly, posix_only, run, script
 from tests.hostile import HOSTILE, make
 from tolcontact import vocabulary
 from tolcontact.errors import ArchiveError
@@ -23,9 +23,9 @@ NAMES = [coordinate.name for coordinate in vocabulary.COORDINATES]
 
 
 @pytest.fixture(scope="module")
-def good(tmp_path_factory):
+def good(program, tmp_path_factory):
     path = tmp_path_factory.mktemp("good") / "ra1.nc"
-    tc.run(ra1.assembly, samples=5000, solver="daqp", out=path, surfaces=4).close()
+    tc.run(program, samples=5000, out=path, surfaces=4).close()
     return path
 
 
@@ -36,7 +36,7 @@ def said(good):
 
 @pytest.fixture(scope="module")
 def program():
-    return tc.build(ra1.assembly, solver="daqp")
+    return compiled(ra1.assembly, solver="daqp", method=PAPER)
 
 
 @pytest.fixture
@@ -109,7 +109,7 @@ def test_a_damaged_file_is_refused_or_says_what_it_said(seed, said, good, progra
         assert found.identical(expected)
 
 
-def test_damage_to_realizations_is_told_with_its_place(good, tmp_path):
+def test_damage_to_realizations_is_told_with_its_place(good, program, tmp_path):
     path, content = tmp_path / "damaged.nc", bytearray(good.read_bytes())
     with netCDF4.Dataset(good) as file:
         value = np.asarray(file["measured"][4500, 1, 0]).tobytes()
@@ -119,7 +119,7 @@ def test_damage_to_realizations_is_told_with_its_place(good, tmp_path):
     with pytest.raises(ArchiveError, match='"measured" of realizations 0 to 4999 is not what was written'):
         tc.summarize(path)
     with pytest.raises(ArchiveError, match="is not what was written"):
-        tc.run(ra1.assembly, samples=6000, solver="daqp", out=path, resume=True, surfaces=4)
+        tc.run(program, samples=6000, out=path, resume=True, surfaces=4)
     with xr.open_dataset(path) as without_us, pytest.raises(RuntimeError):
         without_us["measured"].load()
 
@@ -163,7 +163,7 @@ def test_things_may_be_called_like_dimensions_of_the_archive(name, tmp_path):
     a.contact(name, moving=above.face("-z"), reference=below.face("+z"), points=20)
     a.measure(name, above.point(5, 5, 5), along="z", tolerance=0.1)
     path = tmp_path / "named.nc"
-    with tc.run(a, samples=100, solver="daqp", out=path) as results:
+    with tc.run(compiled(a, solver="daqp"), samples=100, out=path) as results:
         found = tc.summarize(results)
     assert found["statistic_value"].sel(measure=name).notnull().any()
     assert found["field_extreme"].sel(part=name).notnull().all()

@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import assembly_of
+from tests.helpers import assembly_of, compiled
 from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
 from tolcontact.testing import assert_same_run
@@ -46,7 +46,7 @@ def tangent_plane(corners):
 
 def outside_share(association, width=0.1):
     """The share of far faces outside of the zone that the tangent of the side places."""
-    nominal = tc.build(plate(association), solver="daqp").nominal
+    nominal = compiled(plate(association), solver="daqp").nominal
     deviations = draw(nominal, seed=3, start=0, stop=1000)
     side, far = (moved_corners(nominal, deviations, name, (0, at)) for name, at in (("side", 0.0), ("far", 60.0)))
     outside = 0
@@ -66,7 +66,7 @@ def test_a_datum_by_least_squares_leaves_many_outside_of_that_zone():
 
 
 def test_the_shift_of_the_datum_follows_from_the_tilt_and_is_measured_back():
-    program = tc.build(plate("outside", corner=(5.0, -3.0, 2.0)), solver="daqp")
+    program = compiled(plate("outside", corner=(5.0, -3.0, 2.0)), solver="daqp")
     labels = list(program.nominal.contributors)
     deviations = program.draws(seed=5, start=0, stop=200)
     shift = deviations[:, labels.index("plate.far.datum B of A|B|C")]
@@ -126,7 +126,7 @@ def block_with_top(*tolerances):
 def test_the_lower_segment_of_a_composite_frame_limits_tilts_as_an_orientation_tolerance_does():
     lower = block_with_top(tc.Profile(0.5, "A|B|C"), tc.Profile(0.1, "A><"))
     oriented = block_with_top(tc.Profile(0.5, "A|B|C"), tc.Parallelism(0.1, "A"))
-    spreads = [[contributor.spread for contributor in tc.build(model).draws.contributors] for model in (lower, oriented)]
+    spreads = [[contributor.spread for contributor in compiled(model).draws.contributors] for model in (lower, oriented)]
     assert spreads[0] == pytest.approx(spreads[1], rel=1e-9)
     zones = measured_back(lower, 20_000)
     assert (zones.lower < 0.9973).all() and (zones.upper > 0.9973).all()
@@ -144,7 +144,7 @@ def test_a_datum_that_locks_directions_alone_is_not_followed_to_its_place(system
     )
     hole = part.feature("hole", part.face(tc.select.Brep((19.05, 15.0, 1))), tc.Position(1e-6, system))
     model.measure("hole", hole.axis(1), along="y")
-    program = tc.build(model)
+    program = compiled(model)
     hole, deviations = program.nominal.features[-1], program.draws(seed=1, start=0, stop=100)
     coordinates = dict(zip(hole.geometry.names, hole.coordinates @ deviations[:, : hole.coordinates.shape[1]].T, strict=True))
     tilt = deviations[:, program.nominal.contributors.index("cover.far.tilt z")]
@@ -177,12 +177,12 @@ def with_pads(targets=((10, 10), (50, 10), (30, 30))):
 
 def test_what_refers_to_datum_targets_stands_still_if_the_targets_are_the_locators():
     """The pads move by up to 0.02 mm; the top is where the fixture is, whatever the pads are."""
-    results = tc.run(with_pads(), samples=300)
+    results = tc.run(compiled(with_pads()), samples=300)
     measured = results.measured.sel(state="raw")
     assert np.abs(measured.sel(measure=["near", "far"])).max() < 1e-5  # turns, to second order
     assert np.abs(measured.sel(measure=["near, pad", "far, pad"])).max() > 0.005
     assert tc.io.model_of(results).parts[0].targets[0].points[0].position == (10, 10, 0)
-    assert_same_run(results, tc.run(tc.io.model_of(results), samples=300))
+    assert_same_run(results, tc.run(compiled(tc.io.model_of(results)), samples=300))
 
 
 def test_targets_give_the_plane_through_them():

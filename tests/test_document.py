@@ -6,14 +6,14 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tolcontact.report import write_page
 
 
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
     path = tmp_path_factory.mktemp("document") / "ra1.nc"
-    tc.run(cases.ra1(), samples=1000, seed=1, solver="daqp", out=path, surfaces=8).close()
+    tc.run(compiled(cases.ra1(), solver="daqp"), samples=1000, seed=1, out=path, surfaces=8).close()
     return path
 
 
@@ -76,7 +76,7 @@ def test_long_tables_of_analyses_are_folded_after_fifteen_rows(tmp_path):
         a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x")), tolerance=0.1, on=block)
     a.measure("sum", lambda poses: sum(poses.translation(part)[2] for part in a.parts[1:]), tolerance=3)
     path = tmp_path / "many.nc"
-    tc.run(a, samples=50, out=path).close()
+    tc.run(compiled(a), samples=50, out=path).close()
     tc.analyses.sensitivities(a, samples=10, into=path)
     with tc.open_archive(path) as results:
         write_page(results, tc.summarize(results), tmp_path / "many.html")

@@ -106,7 +106,7 @@ def test_conflicts_of_a_beam_do_not_depend_on_its_place_and_are_recomputed(tmp_p
     overlaps = []
     for turned in (False, True):
         model = beam(tmp_path, range(6), *SIDES, ((200, 0, 0), "-z", True), turned=turned)
-        with tc.run(model, samples=16, seed=3, out=tmp_path / f"{turned}.nc") as results:
+        with tc.run(compiled(model), samples=16, seed=3, out=tmp_path / f"{turned}.nc") as results:
             overlaps.append(np.where(results.status == Status.NOT_ASSEMBLABLE, results.gap_min[:, CORRECTED].min("pair"), 0))
             counts = tc.summarize(results)["conflicts"].to_series()
         assert_gaps_recompute(tmp_path / f"{turned}.nc")

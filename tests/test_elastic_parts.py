@@ -204,7 +204,7 @@ def test_a_heavy_beam_on_three_supports_rests_mostly_on_the_middle_one(tmp_path)
 
 def test_fields_and_the_picture_of_the_page_show_bending(tmp_path):
     """A beam that a constant force bends between its feet: in the middle, its field is what is measured there."""
-    with tc.run(supported_beam(tmp_path, 1000.0), samples=40, seed=1) as results:
+    with tc.run(compiled(supported_beam(tmp_path, 1000.0)), samples=40, seed=1) as results:
         write_page(results, tc.summarize(results), tmp_path / "page.html")
         field, measured = results["field/beam"].to_dataset(), results.measured.sel(state="corrected", measure="middle")
         k = np.abs(field.vertices.values - (200, 0, 0)).sum(axis=1).argmin()

@@ -79,10 +79,16 @@ def assert_right(program, bodies, samples, seed=1, doubted=0):
     return counts
 
 
-ALIKE = ("chamfer without clearance", "needles", "steep cone", "ridge over an edge")  # others are much like these
+ALIKE = (
+    "crossing roofs",
+    "chamfer without clearance",
+    "needles",
+    "steep cone",
+    "ridge over an edge",
+)  # others are much like these
 
 
-@pytest.mark.parametrize("samples", [30, *nightly(60)])
+@pytest.mark.parametrize("samples", [20, *nightly(60)])
 @pytest.mark.parametrize("name", [*(name for name in CASES if name not in ALIKE), *nightly(*ALIKE)])
 def test_every_certificate_holds_for_the_bodies(name, samples):
     assert_right(program_of(name), nominal_case(name)[1], samples=samples)
@@ -92,7 +98,7 @@ def test_every_certificate_holds_for_the_bodies(name, samples):
 def test_no_certificate_of_whole_bodies_is_wrong(name):
     """A nut over a washer's rim, a key in a dovetail, a pin that leaves its hole."""
     model, bodies = whole_case(name)
-    assert_right(compiled(model, solver="daqp"), bodies, samples=30)
+    assert_right(compiled(model, solver="daqp"), bodies, samples=20)
 
 
 @pytest.mark.slow
@@ -118,7 +124,7 @@ def test_a_plate_that_slides_clear_of_a_chamfered_block_is_never_touched(selecti
         block, plate = model.parts
         model.contact("top alone", moving=plate.face("-z"), reference=block.face(selection))
         model = compiled(model)
-    run = tc.run(model, samples=100, seed=2, surfaces=0, fields="none")
+    run = tc.run(model, samples=50, seed=2, surfaces=0, fields="none")
     assert (run.status == 0).all()
     assert np.array_equal(run.measured.sel(state="raw"), run.measured.sel(state="corrected"))
 
@@ -165,7 +171,7 @@ def test_contact_of_planes_where_bodies_are_apart_is_measured_and_the_advice_hel
         with pytest.warns(
             tc.errors.ContactWarning, match=f'contact pair "contact": contact was resolved where .* apart.*; .*{advice}'
         ):
-            fixed = tc.run(program_of("chamfer", method, solver="qpoases"), samples=200, seed=1)
+            fixed = tc.run(program_of("chamfer", method, solver="qpoases"), samples=200, seed=1, fields="none")
         summary, told = tc.summarize(fixed), printed(tc.summarize(fixed))
         assert 0.05 < float(summary.false_contact.max()) < 0.4
         assert 'contact pair "contact": points lie up to' in told and advice in told
@@ -175,7 +181,7 @@ def test_contact_of_planes_where_bodies_are_apart_is_measured_and_the_advice_hel
         assert share == (fixed["surface"].false_contact.values[at_random] > 0.006).mean()
         assert 0 < float(summary.contacts_ended) <= float(summary.contacts)
         assert f"{float(summary.contacts_ended):.0f} of {float(summary.contacts):.0f} touching contact points" in told
-    bounded = tc.run(program_of("chamfer", solver="qpoases"), samples=200, seed=1)
+    bounded = tc.run(program_of("chamfer", solver="qpoases"), samples=50, seed=1, fields="none")
     assert np.isnan(tc.summarize(bounded).false_contact).all()
     assert "apart" not in printed(tc.summarize(bounded))
 
@@ -207,13 +213,13 @@ def test_contact_of_faces_that_do_not_end_is_not_called_false():
 def test_a_turn_that_contact_barely_holds_is_doubted():
     """The points over a steep cone lie in nearly one place: of few of them that are active, the plate may turn over the tip."""
     program = program_of("steep cone", tc.Method(objective="active points"))
-    run = joined(simulate_blocks(program, samples=200, seed=1))
+    run = joined(simulate_blocks(program, samples=100, seed=1))
     (places,) = program.meetings.values()
     turns = pose.turn(run["poses"][:, 1, 1], run["poses"][:, 0, 1])
     certified = np.isin(run["status"], [tc.Status.UNTOUCHED, tc.Status.RESOLVED])
     assert (turns > 0.7).sum() > 10 and turns[certified].max() < 2 * places.turn < 0.3
     assert (run["status"][~certified] == tc.Status.DOUBTFUL).all()
-    run = joined(simulate_blocks(program_of("steep cone", tc.Method()), samples=200, seed=1))
+    run = joined(simulate_blocks(program_of("steep cone", tc.Method()), samples=100, seed=1))
     assert run["status"].max() == tc.Status.RESOLVED
 
 
@@ -239,7 +245,7 @@ def test_deviations_beyond_all_that_were_tried_are_resolved_too(solver):
 
 
 @pytest.mark.parametrize("solver", ["daqp", "graph"])
-@pytest.mark.parametrize("blocks, samples", [(2, 600), *nightly((6, 600))])
+@pytest.mark.parametrize("blocks, samples", [(2, 200), *nightly((6, 600))])
 def test_faces_under_load_touch(blocks, samples, solver):
     """A place that stayed beside its edge would hold faces apart, by up to 1e-4 mm: complementarity is that of the bodies."""
     _, run = simulate(tower.assembly(blocks), samples=samples, solver=solver)

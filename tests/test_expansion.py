@@ -105,7 +105,7 @@ def test_analyses_name_the_temperature():
 def test_archives_and_models_as_data_hold_the_expansion(tmp_path):
     a = tower(TURNED)
     a.variable("warmth", 30, units="K", expands={"low": 23e-6, "high": 9e-6})
-    results = tc.run(a, samples=8, keep="all")
+    results = tc.run(compiled(a), samples=8, keep="all")
     assert_gaps_recompute(results)
     warmth = results["sample"].deviation.sel(contributor="warmth").values
     assert results.measured.sel(state="corrected", measure="to z").values - 37 == pytest.approx(523e-6 * warmth, abs=1e-9)

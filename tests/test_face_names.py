@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tolcontact as tc
-from tests.helpers import assembly_of, call
+from tests.helpers import assembly_of, call, compiled
 from tests.step_files import Step, assembly, corners, step_of
 from tests.test_cad import COVER
 from tests.test_json_models import written
@@ -67,12 +67,12 @@ def test_names_come_with_the_archive(tmp_path):
     pin = model.part("pin", tc.Box(4, 4, 4), at=(3, 8, 30))
     model.locate(pin, tc.three_two_one(pin.face("-z"), pin.face("-y"), pin.face("-x"), inset=0.5), tolerance=0.2)
     model.contact("seat", moving=pin.face("-z"), reference=block.face(tc.select.Brep("to +z")))
-    with tc.run(model, samples=50, seed=1, out=tmp_path / "run.nc", solver="daqp") as results:
+    with tc.run(compiled(model, solver="daqp"), samples=50, seed=1, out=tmp_path / "run.nc") as results:
         seat = discretize(model).triangles(block.face(tc.select.Brep("to +z")))
         (tmp_path / "named.step").unlink()
         rebuilt = tc.io.model_of(results)
         assert discretize(rebuilt).triangles(rebuilt.parts[0].face(tc.select.Brep("to +z"))) == seat
-        again = tc.run(tc.io.model_of(results), samples=50, seed=1, solver="daqp")
+        again = tc.run(compiled(tc.io.model_of(results), solver="daqp"), samples=50, seed=1)
         assert again.measured.equals(results.measured) and again.gap_min.equals(results.gap_min)
 
 

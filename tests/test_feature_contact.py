@@ -34,7 +34,7 @@ def test_faces_of_features_are_resolved_by_every_objective(objective, search, tm
     a.force("weight", at=block.point(25, 15, 10), vector=(0, 0, -1))
     a.measure("height", under.point(50, 30, 0), along="z", tolerance=0.2)
     program = compiled(a, solver="daqp")
-    results = tc.run(program, samples=40, seed=5, surfaces=40, out=tmp_path / "table.nc")
+    results = tc.run(program, samples=20, seed=5, surfaces=20, out=tmp_path / "table.nc")
     assert set(results["status"].values.tolist()) <= {0, 1} and (results["status"].values == 1).any()
     assert_resolved(tmp_path / "table.nc")
     assert_gaps_recompute(tmp_path / "table.nc")

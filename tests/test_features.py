@@ -50,12 +50,12 @@ def test_spread_of_a_measure_is_that_of_the_closed_form():
 
 def test_a_line_profile_is_that_of_the_surface_and_an_archive_has_it(tmp_path):
     surface = tc.run(compiled(toleranced.block_with("top", tc.Profile(0.3, "A"))), samples=500)
-    results = tc.run(toleranced.block_with("top", tc.LineProfile(0.3, "A")), samples=500, out=tmp_path / "lines.nc")
+    results = tc.run(compiled(toleranced.block_with("top", tc.LineProfile(0.3, "A"))), samples=500, out=tmp_path / "lines.nc")
     assert np.array_equal(results.measured.values, surface.measured.values)
     offset = results["sample"].sel(contributor="block.top.offset")
     assert float(offset.deviation.std()) == pytest.approx(0.3 / 11.768, rel=0.1)
     assert str(offset.distribution.values) == "line profile 0.3 mm to A; 99.73 % inside"
-    assert_same_run(results, tc.run(tc.io.model_of(results), samples=500))
+    assert_same_run(results, tc.run(compiled(tc.io.model_of(results)), samples=500))
 
 
 def test_opposed_planes_share_their_size_and_their_middle():

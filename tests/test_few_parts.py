@@ -9,6 +9,7 @@ from rich.console import Console
 from scipy import optimize, stats
 
 import tolcontact as tc
+from tests.helpers import compiled
 from tolcontact.report import summary_text
 
 PARTS, MEAN, SD = 30, 0.01, 0.02
@@ -31,7 +32,7 @@ def supplied(count=1, parts=PARTS, limits=(None, 0.06)):
 
 def figures(model, samples=10_000, measure="gap"):
     """Return the FIGURES (figure, interval) of a measure, or of each of some."""
-    summary = tc.summarize(tc.run(model, samples=samples, seed=3))
+    summary = tc.summarize(tc.run(compiled(model), samples=samples, seed=3))
     return summary.statistic_value.sel(measure=measure, state="corrected", statistic=FIGURES).values
 
 
@@ -150,7 +151,7 @@ def test_causes_are_no_parts():
 def test_parts_are_declared_kept_and_told():
     model = supplied(count=6)
     assert str(model.variables[0].tolerance) == "mean 0.01, standard deviation 0.02 mm of 30 parts"
-    (line,) = tc.build(model).draws.in_words
+    (line,) = compiled(model).draws.in_words
     assert line.endswith("include: link 0, link 1, link 2, link 3 and 2 more from 30 parts")
     faults = {
         tc.Tolerance(distribution=stats.norm(0, 1), parts=4): "parts is 4; expected a whole number, 5 or more",

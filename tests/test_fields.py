@@ -6,7 +6,7 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 
 
 def pile(sections: int) -> tc.Assembly:
@@ -25,7 +25,7 @@ def pile(sections: int) -> tc.Assembly:
 @pytest.mark.slow
 @pytest.mark.parametrize("sections", [8, 200, *nightly(700)])
 def test_the_field_of_a_part_with_any_number_of_vertices_is_that_of_its_poses(sections):
-    tree = tc.run(pile(sections), samples=300, solver="daqp", surfaces=0)
+    tree = tc.run(compiled(pile(sections), solver="daqp"), samples=300, surfaces=0)
     field = tree["field/block"].to_dataset()
     v = field["vertices"].values
     assert len(v) >= 2 * sections
@@ -43,7 +43,7 @@ def test_the_field_of_a_part_with_any_number_of_vertices_is_that_of_its_poses(se
 def test_fields_do_not_depend_on_the_blocks_they_are_summed_up_in():
     """Moments that are put together block by block, against those of the poses of all realizations."""
     samples = 3 * 4096 + 17
-    tree = tc.run(cases.one_dimensional(6), samples=samples, solver="daqp", keep="poses", surfaces=0)
+    tree = tc.run(compiled(cases.one_dimensional(6), solver="daqp"), samples=samples, keep="poses", surfaces=0)
     for part in ("base", "block"):
         field = tree[f"field/{part}"].to_dataset()
         height = tree["translation"].sel(part=part, axis="z").values

@@ -7,7 +7,7 @@ from scipy.stats import binom
 
 import tolcontact as tc
 from tests.cases import Frame, floating
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tolcontact.errors import ModelError
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import Status
@@ -25,7 +25,7 @@ def drawn(results, label):
 @pytest.mark.parametrize("frame", [*nightly(None), MOVED], ids=["still", "moved"])
 @pytest.mark.parametrize("sections", [24, *nightly(90)])
 def test_a_shaft_in_a_v_comes_to_where_its_diameter_and_the_walls_say(frame, solver, sections):
-    results = tc.run(floating.floating_shaft_in_a_v(sections, frame=frame), samples=300, solver=solver)
+    results = tc.run(compiled(floating.floating_shaft_in_a_v(sections, frame=frame), solver=solver), samples=300)
     assert_resolved(results)
     assert_gaps_recompute(results)
     of = [drawn(results, label) for label in ("left.wall.offset", "right.wall.offset", "shaft.barrel.size")]
@@ -36,7 +36,7 @@ def test_a_shaft_in_a_v_comes_to_where_its_diameter_and_the_walls_say(frame, sol
 
 @pytest.mark.slow
 def test_a_peg_is_pushed_to_the_side_of_its_hole():
-    results = tc.run(floating.floating_peg_in_a_hole(), samples=1000, solver="daqp")
+    results = tc.run(compiled(floating.floating_peg_in_a_hole(), solver="daqp"), samples=1000)
     assert_resolved(results)
     assert_gaps_recompute(results)
     measured = results.measured.sel(state="corrected")
@@ -51,7 +51,7 @@ def test_a_peg_is_pushed_to_the_side_of_its_hole():
 @pytest.mark.slow
 def test_a_hinge_pin_tilts_between_its_knuckles():
     reach, width = 40.0, 8.0
-    results = tc.run(floating.hinge(reach=reach, width=width), samples=300, solver="daqp")
+    results = tc.run(compiled(floating.hinge(reach=reach, width=width), solver="daqp"), samples=300)
     assert_resolved(results)
     assert_gaps_recompute(results)
     pin, along = drawn(results, "pin.barrel.size"), drawn(results, "pin.end")
@@ -66,7 +66,7 @@ def test_a_hinge_pin_tilts_between_its_knuckles():
 
 @pytest.mark.slow
 def test_a_lid_finds_its_place_over_four_studs():
-    results = tc.run(floating.lid_on_studs(position=0.1, clearance=0.3), samples=150, solver="daqp")
+    results = tc.run(compiled(floating.lid_on_studs(position=0.1, clearance=0.3), solver="daqp"), samples=150)
     assert_resolved(results)
     x = results.measured.sel(state="corrected", measure="x").values
     holes, studs, room = floating.drawn_of_lid(results)
@@ -97,7 +97,7 @@ def test_the_share_that_cannot_be_assembled_is_that_of_an_independent_computatio
     """Two hole patterns, position at maximum material or without: the least of the largest misfits, by shifting and turning."""
     words = {"material": "M"} if material else {}
     model = floating.lid_on_studs(position=0.35, sizes=0.15, clearance=0.25, seating=False, **words)
-    results = tc.run(model, samples=120, solver="daqp", surfaces=0, fields="none")
+    results = tc.run(compiled(model, solver="daqp"), samples=120, surfaces=0, fields="none")
     status = results.status.values
     assert np.isin(status, [Status.UNTOUCHED, Status.RESOLVED, Status.NOT_ASSEMBLABLE]).all()
     holes, studs, room = floating.drawn_of_lid(results)
@@ -134,7 +134,7 @@ def most_room(holes, studs, room) -> float:
 def test_a_part_that_nothing_holds_is_not_certified():
     a = floating.floating_peg_in_a_hole()
     a.force("pull out", at=a.parts[1].point(0, 0, 0), vector=(0, 0, 0.001))
-    held = tc.run(a, samples=20)
+    held = tc.run(compiled(a), samples=20)
     assert_resolved(held)  # along z it is held both ways
     loose = tc.Assembly("loose", method=floating.SEATED)
     table = loose.part("table", tc.Box(50, 50, 5), fixed=True)
@@ -145,7 +145,7 @@ def test_a_part_that_nothing_holds_is_not_certified():
     loose.measure("z", block.point(0, 0, 0), along="z")
     results = tc.run(loose, samples=5)
     assert (results.status == Status.NOT_CONVERGED).all()
-    still = tc.run(loose, samples=5, method=tc.Method(resolution="exact"))
+    still = tc.run(compiled(loose, method=tc.Method(resolution="exact")), samples=5)
     assert (still.status == Status.UNTOUCHED).all() and np.abs(still.measured).max() == 0
 
 
@@ -160,7 +160,7 @@ def test_locators_of_a_floating_part_move_it_as_little_as_they_can():
         a.contact("seat", moving=block.face("-z"), reference=table.face("+z"), within=5)
         for axis, along in (("x", (1, 0, 0)), ("y", (0, 1, 0)), ("z", (0, 0, 1))):
             a.measure(axis, block.point(33, 4, 5), along=frame.along(*along))
-        results = tc.run(a, samples=50)
+        results = tc.run(compiled(a), samples=50)
         x, y, z = results.measured.sel(state="raw").values.T
         assert np.abs(x - drawn(results, "block.X")).max() < 1e-9 and np.abs(y).max() < 1e-9
         assert np.abs(z - drawn(results, "block.Z")).max() < 1e-9
@@ -210,7 +210,7 @@ def test_one_sided_locators_hold_a_floating_part_as_they_hold_any_other():
         a.measure("height", block.point(50, 20, 0), along="z")
         return a
 
-    afloat, fixed = (tc.run(on_three_supports(k), samples=200, seed=1, surfaces=0) for k in (True, False))
+    afloat, fixed = (tc.run(compiled(on_three_supports(k)), samples=200, seed=1, surfaces=0) for k in (True, False))
     assert_resolved(afloat)
     heights = [results.measured.sel(state="corrected").values for results in (afloat, fixed)]
     assert np.abs(heights[0] - heights[1]).max() < 1e-9

@@ -43,7 +43,7 @@ def rectangles(frame=None):
     return rectangle(AT, BLOCK, -1), rectangle((0, 0, 10), TABLE, 1)
 
 
-def check(model, moving, reference, samples=12):
+def check(model, moving, reference, samples=6):
     run = tc.run(compiled(model, solver="graph"), samples=samples, seed=3, fields="none", surfaces=samples)
     certified = np.isin(run.status.values, (Status.UNTOUCHED, Status.RESOLVED))
     depths = deepest(run, moving, reference)[certified]
@@ -59,7 +59,7 @@ def check(model, moving, reference, samples=12):
     ("faces", "whole"), [("block", False), ("table", False), ("table", True), *nightly(("block table", False))]
 )
 def test_a_box_on_a_box(faces, whole, spacing):
-    check(box_on_box(faces, whole=whole, spacing=spacing), *rectangles(), samples=60 if spacing else 12)
+    check(box_on_box(faces, whole=whole, spacing=spacing), *rectangles(), samples=60 if spacing else 6)
 
 
 def test_a_box_on_a_box_that_stand_anywhere():  # both with form

@@ -7,7 +7,7 @@ from scipy.stats import beta
 import tolcontact as tc
 from tests.cases import toleranced
 from tests.cases.seats import seat
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tests.population_referee import measured_back
 
 FORMS = [tc.Form(), tc.Form(length=10), tc.Form("matern 5/2"), tc.Form("matern 3/2")]
@@ -15,7 +15,7 @@ SHARE = 0.9973002039367398
 
 
 def field_of(form):
-    return tc.build(seat(form)).nominal.features[0].form
+    return compiled(seat(form)).nominal.features[0].form
 
 
 def test_modes_displace_no_face_as_a_whole_and_leave_little_out():
@@ -38,7 +38,7 @@ def count_inside(needed, count):
 
 @pytest.mark.parametrize(("flatness", "spread"), [(0.1, 19.52), *nightly((0.05, 12.84))])
 def test_form_and_displacements_share_the_zone_around_them(flatness, spread):
-    program = tc.build(toleranced.block_with("top", tc.Profile(0.2, "A|B|C"), tc.Flatness(flatness)))
+    program = compiled(toleranced.block_with("top", tc.Profile(0.2, "A|B|C"), tc.Flatness(flatness)))
     own = {contributor.label: contributor.spread for contributor in program.draws.contributors}
     assert own["block.top.offset"] == own["block.top.tilt x"] == pytest.approx(0.2 / spread, rel=0.015)
     (top,) = (feature for feature in program.nominal.features if feature.feature.name == "top")
@@ -72,8 +72,8 @@ def test_a_population_is_measured_with_its_form():
 
 def test_a_profile_without_datums_is_the_form_of_a_plane():
     spreads = [
-        [contributor.spread for contributor in tc.build(toleranced.block_with("top", tolerance)).draws.contributors]
+        [contributor.spread for contributor in compiled(toleranced.block_with("top", tolerance)).draws.contributors]
         for tolerance in (tc.Flatness(0.1), tc.Profile(0.1), tc.LineProfile(0.1))
     ]
     assert len(spreads[0]) == 20 and spreads[0] == spreads[1] == spreads[2]
-    assert not len(tc.build(toleranced.block_with("top", tc.Profile(0.1, form=None))).draws.contributors)
+    assert not len(compiled(toleranced.block_with("top", tc.Profile(0.1, form=None))).draws.contributors)

@@ -11,7 +11,7 @@ import netCDF4
 import pytest
 
 import tolcontact as tc
-from tests.helpers import SCRIPTS, model_in, run
+from tests.helpers import SCRIPTS, compiled, model_in, run
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 from tolcontact.vocabulary import BY_REALIZATION, FORMAT, LOCATOR_OFFSET
@@ -49,7 +49,7 @@ def test_the_archive_is_opened_and_summarized(stored):
 @pytest.mark.slow
 def test_its_model_is_rebuilt_and_gives_the_same_results(stored):
     model = model_in(stored)
-    program = tc.build(model, method=METHOD)
+    program = compiled(model, method=METHOD)
     assert program.nominal.locators.labels[:6] == tuple(f"block.{name}" for name in ("A1", "A2", "A3", "B1", "B2", "C"))
     with tc.open_archive(stored) as then:
         now = tc.run(model, samples=8, seed=1, solver="daqp", method=METHOD, surfaces=4)

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 import tolcontact as tc
-from studies.benchmarks.friction import least_coefficient
+from studies.benchmarks.friction import is_held
 from studies.benchmarks.problems import friction_on_an_incline as incline
 from tests import cases
 from tests.cases.frames import STILL
@@ -46,7 +46,8 @@ def test_a_seat_agrees_with_a_brute_force_over_directions_of_friction(clamp):
         others = [(at, into) for other, (at, into) in STOPS.items() if other != name]
         loads = [((50, 30, 10), (0, 0, -10)), (CLAMP_AT, clamp)]
         contacts = [*((pad, (0, 0, 1)) for pad in PADS), *others]
-        assert found[f"block.{name}"] == pytest.approx(least_coefficient(contacts, loads), rel=1e-5)
+        least = found[f"block.{name}"]
+        assert is_held(contacts, loads, least * (1 + 1e-5)) and not is_held(contacts, loads, least * (1 - 1e-5))
 
 
 def test_turned_frames_and_other_units_change_nothing():
@@ -156,7 +157,7 @@ def pushed_blocks(pushes, joined=False):
     return line
 
 
-@pytest.mark.parametrize("joined", [False, True])
+@pytest.mark.parametrize("joined", [True, *nightly(False)])
 def test_each_station_has_seats_with_its_own_forces(joined):
     found = critical(pushed_blocks({"first": 3.0, "second": 7.0}, joined))
     body = "stack" if joined else "block"

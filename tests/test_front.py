@@ -83,18 +83,18 @@ def test_faults_are_listed_without_a_run():
 
 @pytest.mark.slow
 def test_a_model_is_resolved_by_its_own_method_unless_somebody_says_otherwise(tmp_path):
-    model = cases.model("tower", 2)
+    model, quick = cases.model("tower", 2), {"surfaces": 0, "fields": "none"}
     assert model.method == ALL_POINTS
     for given, expected, whose in (
         (None, ALL_POINTS, "model"),
         ({"resolution": "linearized"}, tc.Method(resolution="linearized", objective="all points"), "options"),
         (tc.Method(objective="active points"), tc.Method(objective="active points"), "options"),
     ):
-        with tc.run(model, samples=20, solver="daqp", method=given) as run:
+        with tc.run(model, samples=4, solver="daqp", method=given, **quick) as run:
             assert (run.attrs["resolution"], run.attrs["objective"]) == (expected.resolution, expected.objective)
             assert run.attrs["method_from"] == whose
             assert tc.io.model_of(run).method == ALL_POINTS
-    with tc.run(cases.stack(), samples=20, solver="daqp") as run:
+    with tc.run(cases.stack(), samples=4, solver="daqp", **quick) as run:
         assert run.attrs["method_from"] == "defaults" and tc.io.model_of(run).method is None
     (tmp_path / "tower.py").write_text("from models import tower\n\n\ndef assembly():\n    return tower.assembly(2)\n")
     assert "resolution: exact" in call(tmp_path, "run", "tower.py", "--samples", "20").stdout

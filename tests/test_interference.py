@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from tests.helpers import compiled
+from tests.helpers import compiled, nightly
 from tolcontact.interference import Neighbours, solid
 from tolcontact.poses import AT_REST
 
@@ -171,7 +171,7 @@ def radii(run, bodies, part="upper"):
     return np.array([common_ball(*bodies, X) for X in np.hstack([R, t])])
 
 
-@pytest.mark.parametrize("start", [-10, -12])
+@pytest.mark.parametrize("start", [-12, *nightly(-10)])
 def test_a_ridge_that_ends_below_a_plate_is_in_no_certified_plate(start):
     model, bodies = set_down(PLATE, [(start, 0, 0), *ROOF[1:]])
     depths = radii(simulated(compiled(model, solver="daqp"), 150), bodies)

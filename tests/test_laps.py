@@ -14,7 +14,7 @@ from tests.test_ends import FAULTS
 from tolcontact.vocabulary import Status
 
 # Some of several shapes that differ little: a lap of any size, steps, walls.
-AT_NIGHT = ("lap of two corners", "low step", "two walls", "wall shorter than the box")
+AT_NIGHT = ("lap of two corners", "lap of a wider box", "low step", "two walls", "wall shorter than the box")
 
 
 # Realizations that are doubtful, by name and `reverses`: of a strip of 0.3 mm, around which the body turns by 26 degrees.
@@ -26,23 +26,23 @@ def program_of(name, **options):
     return compiled(case(name, **options)[0], solver="daqp")
 
 
-@pytest.mark.parametrize("reverses", [False, *nightly(True)])
+@pytest.mark.parametrize(("samples", "reverses"), [(20, False), *nightly((40, False), (40, True))])
 @pytest.mark.parametrize("name", [*(name for name in CASES if name not in AT_NIGHT), *nightly(*AT_NIGHT)])
-def test_whole_bodies_are_resolved(name, reverses):
+def test_whole_bodies_are_resolved(name, samples, reverses):
     options = {"reverses": True} if reverses else {}
-    counts, _ = judged(program_of(name, **options), case(name, **options)[1], 40, 1, None)
+    counts, _ = judged(program_of(name, **options), case(name, **options)[1], samples, 1, None)
     assert {fault: counts[fault] for fault in FAULTS} == dict.fromkeys(FAULTS, 0)
-    assert counts["certified"] == 40 - DOUBTFUL.get((name, reverses), 0)
+    assert counts["certified"] == samples - DOUBTFUL.get((name, reverses), 0)
 
 
 @pytest.mark.parametrize("seed", [10, *nightly(13, 15, 22, 37)])
 def test_whole_surfaces_of_random_bodies(seed):
-    counts, _ = judged(*scene(seed, whole=True), 8, seed, "daqp")
+    counts, _ = judged(*scene(seed, whole=True), 4, seed, "daqp")
     assert {fault: counts[fault] for fault in FAULTS} == dict.fromkeys(FAULTS, 0)
-    assert counts["certified"] == 8
+    assert counts["certified"] == 4
 
 
-@pytest.mark.parametrize("name", ["lap", "long lap", *nightly("lap of a wider box")])
+@pytest.mark.parametrize("name", ["lap", *nightly("long lap", "lap of a wider box")])
 def test_whole_bodies_touch_as_the_planes_between_them(name):
     """The same depth before contact, and the same status, as of underside and top, declared by name."""
     whole, *partly = (
@@ -56,10 +56,10 @@ def test_whole_bodies_touch_as_the_planes_between_them(name):
         assert depths[0].values == pytest.approx(depths[1].values, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["lap", "step"])
+@pytest.mark.parametrize("name", ["step", *nightly("lap")])
 def test_the_frame_of_whole_bodies_does_not_matter(name):
     programs = program_of(name), program_of(name, turn=(0.3, -0.5, 1.1))
-    runs = [tc.run(program, samples=40, surfaces=0, fields="none") for program in programs]
+    runs = [tc.run(program, samples=30, surfaces=0, fields="none") for program in programs]
     assert np.array_equal(runs[0].status, runs[1].status)
     raw = [run.gap_min.sel(state="raw").values for run in runs]
     assert raw[0] == pytest.approx(raw[1], abs=1e-7)

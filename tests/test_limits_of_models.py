@@ -8,7 +8,7 @@ import pytest
 import scipy.stats
 
 import tolcontact as tc
-from tests.helpers import ROOT, call
+from tests.helpers import ROOT, call, compiled
 from tests.test_json_models import PLAIN
 
 RA1 = "models/ra1.py"
@@ -68,7 +68,7 @@ def named(part, station):
 def test_names_of_parts_and_stations_are_as_long_as_those_of_groups_in_an_archive(tmp_path):
     """In UTF-8 an umlaut takes two bytes, or three as a letter and its dots, which the archive composes."""
     longest = "ö" * 127
-    tc.run(named("o\u0308" * 127 + "s", longest + "s"), samples=4, seed=1, out=tmp_path / "long.nc")
+    tc.run(compiled(named("o\u0308" * 127 + "s", longest + "s")), samples=4, seed=1, out=tmp_path / "long.nc")
     part_fault, station_fault = tc.check(named("ö" * 128, longest + "st"))
     assert part_fault.startswith(f"part {'ö' * 40!r}...: the name takes 256 bytes in UTF-8; expected at most 255 (the archive")
     assert station_fault.startswith(f"station {'ö' * 40!r}...: the name takes 256 bytes")

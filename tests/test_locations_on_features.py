@@ -8,6 +8,7 @@ import trimesh
 
 import tolcontact as tc
 from tests.cases import STILL, Frame
+from tests.helpers import compiled
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
 
 TILT = 5e-5  # [mm] of second order: 5 mm times the square of a tilt of 0.003
@@ -42,7 +43,7 @@ def pin_in_a_ring(frame: Frame = STILL) -> tc.Assembly:
 
 @pytest.mark.parametrize("frame", [STILL, Frame(turn=(0, 0, 2.0), shift=(100, -50, 7))], ids=["still", "moved"])
 def test_a_pin_follows_the_axis_of_its_bore_and_a_cap_its_ground(frame):
-    results = tc.run(pin_in_a_ring(frame), samples=60, keep="all")
+    results = tc.run(compiled(pin_in_a_ring(frame)), samples=60, keep="all")
     measured = results.measured.sel(state="corrected")
     for end in (0, 1):
         for axis in "xy":
@@ -63,7 +64,7 @@ def test_a_json_model_names_the_feature_that_a_part_is_on(tmp_path):
     block = a.part("block", tc.Box(20, 20, 5), at=(0, 0, 5))
     a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=0.0, on=top)
     a.measure("step", top.point(20, 0, 5), to=block.point(20, 0, 0), along="z", absolute=False)
-    assert np.abs(tc.run(a, samples=20).measured).max() < TILT
+    assert np.abs(tc.run(compiled(a), samples=20).measured).max() < TILT
     path = tmp_path / "stack.json"
     tc.io.write_model(a, path)
     document = json.loads(path.read_text())

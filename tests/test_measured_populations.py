@@ -6,7 +6,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import assembly_of
+from tests.helpers import assembly_of, compiled
 
 FEET = {"top.A1": "one", "top.A2": "two"}
 
@@ -22,7 +22,7 @@ def correlated(parts=40):
 
 
 def drawn_of(model, count=4000):
-    program = tc.build(model)
+    program = compiled(model)
     return program, dict(zip(program.draws.labels, program.draws(seed=1, start=0, stop=count).T, strict=True))
 
 

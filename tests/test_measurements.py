@@ -7,11 +7,11 @@ import pytest
 
 import tolcontact as tc
 from tests.cases.measured import PLANE, ROUND, drilled, hole, ring, seated, shaft, two
-from tests.helpers import call, json_schema
+from tests.helpers import call, compiled, json_schema
 
 
 def test_what_an_error_of_gaps_does_to_measures_is_stated():
-    results = tc.run(seated(), samples=10, solver="daqp", surfaces=0)
+    results = tc.run(compiled(seated(), solver="daqp"), samples=10, surfaces=0)
     accuracy = dict(zip(results["measure"].values, results["measure_accuracy"].values, strict=True))
     assert accuracy["least"] == pytest.approx(max(accuracy[f"gap {k}"] for k in (0, 2)), rel=0.6)
     assert 1e-8 <= accuracy["clearance"] <= 5e-8 and accuracy["turn"] == pytest.approx(1e-8)
@@ -28,13 +28,13 @@ def test_the_accuracy_of_a_measure_depends_on_how_far_apart_the_contact_of_its_p
         model.contact(part.name, moving=part.face("-z"), reference=base.face("+z"))
     model.measure("top", mast.point(0, 0, 200), along="x")
     model.measure("edge", plate.point(200, 200, 10), along="z")
-    accuracy = tc.build(model).accuracies / 1e-8  # of gaps
+    accuracy = compiled(model).accuracies / 1e-8  # of gaps
     assert accuracy == pytest.approx([1 + 2 * 200 / (10 * 2**0.5), 1 + 2 * 100 / 200], rel=0.1), accuracy
 
 
 def test_measures_at_a_kink_have_no_linear_model():
     """A minimum of equal gaps and an angle from 0 have none; a gap and a signed angle have."""
-    program = tc.build(seated(), solver="daqp")
+    program = compiled(seated(), solver="daqp")
     nominal = tc.analyses.sensitivities(program, samples=4).nominal
     kinked = {name for name in nominal["measure"].values if np.isnan(nominal.sel(measure=name)).any()}
     assert kinked == {"clearance", "least", "tilt"}
@@ -68,10 +68,10 @@ def test_measurements_keep_in_archives_and_json(tmp_path):
     model.measure("x", tc.AxisDistance(hole(left), hole(right), along="x"))
     model.measure("rims", tc.Clearance(left.face(tc.select.Cylinder(radius=9.0)), right.face(tc.select.Cylinder(radius=9.0))))
     model.measure("least", tc.Minimum("distance", tc.Mean(tc.Gap(left.point(0, 8, 6), right.face("+z")), "x"), "rims"))
-    results = tc.run(model, samples=20, solver="daqp", surfaces=0, out=tmp_path / "run.nc")
+    results = tc.run(compiled(model, solver="daqp"), samples=20, surfaces=0, out=tmp_path / "run.nc")
     rebuilt = tc.io.model_of(results)
     assert [measure.of.names for measure in rebuilt.measures] == [measure.of.names for measure in model.measures]
-    again = tc.run(rebuilt, samples=20, solver="daqp", surfaces=0)
+    again = tc.run(compiled(rebuilt, solver="daqp"), samples=20, surfaces=0)
     np.testing.assert_array_equal(again["measured"], results["measured"])
     kinds = ["distance of axes", "angle", "flush", "distance of axes", "clearance", "minimum"]
     assert results["measure_quantity"].values.tolist() == kinds
@@ -81,7 +81,7 @@ def test_measurements_keep_in_archives_and_json(tmp_path):
     entries = json.loads((tmp_path / "model.json").read_text())["measures"]
     assert entries[0]["of"]["kind"] == "clearance" and entries[-3]["of"]["measurements"][-1] == "clearance"
     found = tc.run(tmp_path / "model.json", samples=20, solver="daqp", surfaces=0)
-    np.testing.assert_array_equal(found["measured"], tc.run(boxes, samples=20, solver="daqp", surfaces=0)["measured"])
+    np.testing.assert_array_equal(found["measured"], tc.run(compiled(boxes, solver="daqp"), samples=20, surfaces=0)["measured"])
     assert {"gap", "angle", "minimum"} <= {
         entry["properties"]["kind"].get("const")
         for entry in json_schema()["$defs"].values()

@@ -9,7 +9,7 @@ from scipy.optimize import lsq_linear
 
 import tolcontact as tc
 from tests.cases.measured import check_invariance, motions, observed, placed, shaft, two
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 
 SIZES = np.array([40.0, 30.0, 10.0]), np.array([12.0, 8.0, 6.0])
 PLACES = {  # of the second box relative to the first one: an edge over an edge, a corner over a face, a face beside a face
@@ -110,7 +110,7 @@ def test_a_face_that_grows_comes_nearer():
                                   first_at=(0, 0, 0), first_rotation=(0, 0, 0))  # fmt: skip
     wall = second.feature("wall", second.face(tc.select.Cylinder()), tc.Size(6, 0.4))
     assembly.measure("clearance", tc.Clearance(first.face(), wall))
-    program = tc.build(assembly, solver="daqp")
+    program = compiled(assembly, solver="daqp")
     X = np.tile(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), (2, 2)).reshape(2, -1)
     small, large = program.observe(poses=X, deviations=np.array([[0.0], [0.1]]))["measured"][:, 0]
     assert small == pytest.approx(np.hypot(8, 10) - 3, abs=0.01) and small - large == pytest.approx(0.05, abs=1e-9)
@@ -149,11 +149,11 @@ def test_a_clearance_of_parts_follows_from_the_poses_of_an_archive(tmp_path):
     base, lid = model.part("base", tc.Box(*SIZES[0]), fixed=True), model.part("lid", tc.Box(*SIZES[1]), at=(10, 8, 12))
     model.locate(lid, tc.three_two_one(lid.face("-z"), lid.face("-y"), lid.face("-x"), inset=1), tolerance=0.3)
     model.measure("clearance", tc.Clearance(lid.face(), base.face()))
-    results = tc.run(model, samples=200, solver="daqp", surfaces=0, out=tmp_path / "run.nc")
+    results = tc.run(compiled(model, solver="daqp"), samples=200, surfaces=0, out=tmp_path / "run.nc")
     R, t = (results[name].sel(state="raw", part="lid").values for name in ("rotation", "translation"))
     feet = np.array([(10 + x, 8 + y, 12) for x in (0, SIZES[1][0]) for y in (0, SIZES[1][1])])
     heights = (feet @ R.swapaxes(1, 2) + t[:, None])[..., 2].min(axis=1) - SIZES[0][2]
     values = results["measured"].sel(state="raw", measure="clearance").values
     np.testing.assert_allclose(values, heights, atol=1e-9)
-    again = tc.run(tc.io.model_of(results), samples=200, solver="daqp", surfaces=0)
+    again = tc.run(compiled(tc.io.model_of(results), solver="daqp"), samples=200, surfaces=0)
     np.testing.assert_array_equal(again["measured"], results["measured"])

@@ -9,12 +9,13 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import compiled
 from tests.test_report import data_of
 
 
 @pytest.fixture(scope="module")
 def results():
-    return tc.run(cases.stack(), samples=200, seed=3, solver="daqp", surfaces=0)
+    return tc.run(compiled(cases.stack(), solver="daqp"), samples=200, seed=3, surfaces=0)
 
 
 def scene_in(shown):

@@ -66,7 +66,7 @@ def pinned(*, seat: bool):
 
 
 def test_a_model_with_forces_is_seated_unless_it_has_a_method_and_says_so_if_it_uses_none():
-    run = tc.run(weighed(), samples=20, surfaces=0)
+    run = tc.run(compiled(weighed()), samples=20, surfaces=0)
     assert (run.attrs["objective"], run.attrs["method_from"]) == ("seating", "defaults")
     assert float(abs(run.measured.sel(state="corrected")).max()) < 1e-6  # it lies on the table
     with pytest.warns(tc.NominalWarning, match=r'\[force\] force "weight": without effect, since objective "all points"'):

@@ -9,7 +9,7 @@ from scipy.stats import binom
 import tolcontact as tc
 from tests.cases import Frame
 from tests.cases.toleranced import HOLES, plate_with_holes
-from tests.helpers import assembly_of
+from tests.helpers import assembly_of, compiled
 from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
@@ -151,7 +151,7 @@ def test_the_worst_case_of_a_distance_is_the_zone_of_the_lower_frame():
     left, right = part.pattern("H", *faces, *tolerances).members
     a.measure("distance", right.axis(1), to=left.axis(1), along="x", absolute=False)
     a.measure("place", left.axis(1), along="x")
-    worst = tc.analyses.worst_case(a, samples=256)["worst"].sel(state="corrected")
+    worst = tc.analyses.worst_case(a, samples=64)["worst"].sel(state="corrected")
     assert np.abs(worst.sel(measure="distance")).values == pytest.approx([0.1, 0.1], abs=1e-6)
     assert np.abs(worst.sel(measure="place")).values == pytest.approx([0.225, 0.225], abs=1e-6)
 
@@ -211,10 +211,12 @@ def test_members_are_used_as_features_in_models_archives_and_json(tmp_path):
     for k in range(2):
         a.contact(f"fit {k}", moving=fits.members[k], reference=holes.members[k], within=2)
     a.measure("distance", holes.members[1].axis(1), to=holes.members[0].axis(1), along="x", tolerance=0.2)
-    results = tc.run(a, samples=200, solver="daqp", method={"resolution": "exact"}, out=tmp_path / "plug.nc")
+    results = tc.run(compiled(a, solver="daqp", method={"resolution": "exact"}), samples=200, out=tmp_path / "plug.nc")
     assert_resolved(results)
     assert_gaps_recompute(results)
-    assert_same_run(results, tc.run(tc.io.model_of(results), samples=200, solver="daqp", method={"resolution": "exact"}))
+    assert_same_run(
+        results, tc.run(compiled(tc.io.model_of(results), solver="daqp", method={"resolution": "exact"}), samples=200)
+    )
     shares = tc.analyses.contributions(a, samples=64, by="feature")
     assert {"plate.H", "plate.H 1"} & {name for text in shares["group"].values for name in str(text).split(" + ")}
     for name in ("plate", "plug"):

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases import stations as cases
+from tests.helpers import compiled
 from tolcontact.errors import ModelError
 
 POINTS = [(5, 5, 0, "z"), (95, 8, 0, "z"), (50, 45, 0, "z"), (10, 0, 5, "y"), (90, 0, 5, "y"), (0, 25, 5, "x")]
@@ -23,7 +24,7 @@ def plate(width, placing, points):
 
 
 def drawn(model, samples=200):
-    program = tc.build(model, solver="daqp")
+    program = compiled(model, solver="daqp")
     block = next(iter(tc.simulate_blocks(program, samples=samples, seed=1)))
     return program, block.deviations, block.poses[:, 0]
 
@@ -105,7 +106,7 @@ def test_an_inspection_reports_deviations_from_the_best_fit_of_a_joint():
     check.locate(ab, [*points, *cases.held(a)], tolerance=0, placing="best fit")
     check.measure("end of a", a.point(0, 10, 0), along="z")
     check.measure("end of b", b.point(100, 10, 0), along="z")
-    program = tc.build(line, solver="daqp")
+    program = compiled(line, solver="daqp")
     block = next(iter(tc.simulate_blocks(program, samples=50, seed=1)))
     x = np.array([px + (100 if part is b else 0) for part, px, _ in places])
     off = np.array([float(part is b) for part, _, _ in places])
@@ -134,7 +135,7 @@ def ridden_plate(placing, objective, points=POINTS, fixed=None, **choices):
 
 @pytest.mark.parametrize("placing", ["exact", "best fit"])
 def test_forces_leave_a_part_where_its_locators_have_placed_it(placing):
-    program = tc.build(ridden_plate(placing, "seating"), solver="daqp")
+    program = compiled(ridden_plate(placing, "seating"), solver="daqp")
     block = next(iter(tc.simulate_blocks(program, samples=50, seed=1)))
     assert (block.status == tc.Status.RESOLVED).all()
     assert np.abs(block.measured[:, 1] - block.measured[:, 0]).max() < 1e-9
@@ -150,7 +151,7 @@ def test_springs_of_locators_count_from_where_these_have_placed_a_part():
     """Contact pushes the plate off its place: both placings give it the same push, to first order."""
     moves = {}
     for placing in ("first order", "exact"):
-        program = tc.build(ridden_plate(placing, "locator stiffness", fixed=True), solver="daqp")
+        program = compiled(ridden_plate(placing, "locator stiffness", fixed=True), solver="daqp")
         block = next(iter(tc.simulate_blocks(program, samples=50, seed=1)))
         moves[placing] = block.measured[:, 1] - block.measured[:, 0]
     assert np.abs(moves["exact"]).max() > 0.05

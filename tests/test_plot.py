@@ -6,12 +6,13 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import compiled
 from tolcontact import vocabulary as terms
 
 
 @pytest.fixture(scope="module")
 def results():
-    return tc.run(cases.ra1(), samples=300, seed=2, solver="daqp", surfaces=0)
+    return tc.run(compiled(cases.ra1(), solver="daqp"), samples=300, seed=2, surfaces=0)
 
 
 def test_a_histogram_has_all_realizations_and_the_limits(results):

@@ -14,6 +14,7 @@ from tolcontact.report import analysis_text
 from tolcontact.vocabulary import RELOCATION
 
 FAST = {"solver": "daqp", "samples": 1024}
+QUICK = FAST | {"samples": 256}
 
 
 def plate(measured=(100, 25, 10), tolerance=0.2):
@@ -79,7 +80,7 @@ def test_a_locator_at_the_best_place_stays_there(least, between):
 def test_with_contact_and_a_scheme_on_faces():
     """RA1: a 3-2-1 scheme becomes six locators, and nothing else changes."""
     a = cases.model("ra1")
-    found = tc.analyses.relocate(a, "base.A2", between=((50, 5, 0), (95, 5, 0)), least="corner height: 6 sigma", **FAST)
+    found = tc.analyses.relocate(a, "base.A2", between=((50, 5, 0), (95, 5, 0)), least="corner height: 6 sigma", **QUICK)
     program = compiled(a, solver="daqp")
     (block,) = tc.simulate_blocks(program, samples=2 * 4096, seed=1, start=4096, block=4096)
     estimate, lower, upper = found["reached"].sel(stage="before").values
@@ -98,17 +99,17 @@ def test_locators_of_a_scheme_stand_on_the_same_features():
     scheme = tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=5)
     a.locate(part, scheme, tolerance=0.0)
     a.measure("height", part.point(100, 50, 10), along="z", tolerance=1)
-    own = tc.build(a, solver="daqp").nominal.parts[0].locators
-    k = own.labels.index("plate.A3")
-    found = tc.analyses.relocate(a, "plate.A3", between=((40, 40, 0), (60, 45, 0)), least="height: 6 sigma", **FAST)
     program = compiled(a, solver="daqp")
+    own = program.nominal.parts[0].locators
+    k = own.labels.index("plate.A3")
+    found = tc.analyses.relocate(a, "plate.A3", between=((40, 40, 0), (60, 45, 0)), least="height: 6 sigma", **QUICK)
     (block,) = tc.simulate_blocks(program, samples=4096 * 2, seed=1, start=4096, block=4096)
     assert float(found["reached"][0, 0]) == pytest.approx(6 * block.measured[:, 1, 0].std(ddof=1), rel=1e-6)
     assert own.faces[k] is not None
 
 
 def test_a_place_where_nothing_holds_the_part_is_passed_over():
-    found = tc.analyses.relocate(plate(), "plate.A3", between=((50, 0, 0), (50, 50, 0)), least="height: 6 sigma", **FAST)
+    found = tc.analyses.relocate(plate(), "plate.A3", between=((50, 0, 0), (50, 50, 0)), least="height: 6 sigma", **QUICK)
     worst = found["tried_value"].values
     assert np.isinf(worst).any() and np.isfinite(float(found["reached"][1, 0]))
 

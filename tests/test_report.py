@@ -37,7 +37,7 @@ def unpacked(of):
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "ra1.nc"
-    tc.run(cases.ra1(), samples=500, seed=1, solver="daqp", out=path, surfaces=8).close()
+    tc.run(compiled(cases.ra1(), solver="daqp"), samples=500, seed=1, out=path, surfaces=8).close()
     return path
 
 

@@ -114,7 +114,9 @@ def test_archived_gaps_of_round_faces_recompute_and_the_model_runs_again(name, t
     with tc.run(program, samples=40, out=tmp_path / "run.nc", keep="all") as results:
         assert_resolved(results)
         assert_gaps_recompute(results, within=1e-10)
-        assert_same_run(results, tc.run(tc.io.model_of(results), samples=40, method=SEATED, solver="daqp", keep="all"))
+        assert_same_run(
+            results, tc.run(compiled(tc.io.model_of(results), method=SEATED, solver="daqp"), samples=40, keep="all")
+        )
         assert float(results["surface"].surface_penetration.max()) < 1e-7
 
 

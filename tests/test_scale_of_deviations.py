@@ -124,7 +124,7 @@ def model(seed, declare, factor, is_offset, numbers):
     return a
 
 
-def silent(seed, declare, factor=1.0, *, is_offset=False, numbers=range(12)):
+def silent(seed, declare, factor=1.0, *, is_offset=False, numbers=range(8)):
     """The numbers of the blocks that no fault and no warning names; a model with faults is checked again without these."""
     numbers = list(numbers)
     while numbers:

@@ -9,7 +9,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call
+from tests.helpers import call, compiled
 from tests.test_ra1 import BASE, MEASURED, TOP, plane_weights
 from tolcontact.simulation import simulate_block
 
@@ -37,7 +37,7 @@ def test_leverage_of_locators():
     a.measure("corner", part.point(100, 50, 10), along="z")
     found = tc.analyses.sensitivities(a, samples=2, solver="daqp")["leverage"]
     assert np.isnan(found.sel(contributor="heat")) and float(found.sel(contributor="plate.C1")) == pytest.approx(1, abs=1e-6)
-    own = tc.build(a, solver="daqp").nominal.parts[0].locators
+    own = compiled(a, solver="daqp").nominal.parts[0].locators
     twists = np.linalg.inv(np.hstack([own.directions, np.cross(own.points, own.directions)]))  # columns: t, w for each locator
     corners = np.array([(x, y, z) for x in (0, 100) for y in (0, 50) for z in (0, 10)])
     for label, twist in zip(own.labels, twists.T, strict=True):
@@ -69,7 +69,7 @@ def test_one_dimensional_contact_is_followed_in_half_of_the_realizations():
 @pytest.mark.slow
 def test_intervals_cover():
     """500 repeats of 100 realizations: the mean derivative of max(0, g) is 0.5."""
-    program, inside = tc.build(cases.one_dimensional(0), solver="daqp"), 0
+    program, inside = compiled(cases.one_dimensional(0), solver="daqp"), 0
     for seed in range(500):
         found = tc.analyses.sensitivities(program, samples=100, seed=seed).isel(measure=0)
         _, lower, upper = found["sensitivity"].sel(state="corrected", contributor="block.Z").values
@@ -89,7 +89,7 @@ def test_a_clutch_follows_its_drawing_as_its_formula_says():
 @pytest.mark.slow
 def test_they_are_differences_of_the_engine():
     a = cases.model("lid")
-    program = tc.build(a, solver="daqp", method=a.method)
+    program = compiled(a, solver="daqp", method=a.method)
     found = tc.analyses.sensitivities(program, samples=6, seed=4)
     own = program.draws(seed=4, start=0, stop=6)
     for label in found["contributor"].values[::9]:

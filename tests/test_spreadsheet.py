@@ -7,14 +7,14 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call
+from tests.helpers import call, compiled
 from tolcontact.report import write_spreadsheet
 
 
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
     path = tmp_path_factory.mktemp("sheets") / "ra1.nc"
-    tc.run(cases.ra1(), samples=500, seed=1, solver="daqp", out=path, surfaces=8).close()
+    tc.run(compiled(cases.ra1(), solver="daqp"), samples=500, seed=1, out=path, surfaces=8).close()
     return path
 
 
@@ -78,7 +78,7 @@ def test_archives_with_little_are_spreadsheets_too(tmp_path):
     block = a.part("block", tc.Box(10, 20, 10))
     a.locate(block, cases.translating(0.1))
     a.measure("height", block.point(5, 5, 10), along="z")
-    results = tc.run(a, samples=10, keep="measures")
+    results = tc.run(compiled(a), samples=10, keep="measures")
     write_spreadsheet(results, tc.summarize(results), tmp_path / "t.xlsx")
     book = openpyxl.load_workbook(tmp_path / "t.xlsx")
     assert "Contact" not in book.sheetnames and "no deviations" in book["Contributors"]["B2"].value

@@ -8,7 +8,7 @@ from scipy import integrate, stats
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from tests.helpers import nightly, simulate
+from tests.helpers import compiled, nightly, simulate
 from tolcontact.testing import assert_gaps_recompute
 from tolcontact.vocabulary import CORRECTED, Status
 
@@ -81,7 +81,7 @@ def test_mean_variance_and_share_agree_with_a_quadrature():
 def test_forces_follow_from_the_archive_alone(tmp_path):
     """Compressions of the legs, from archived poses and deviations, times their stiffness are the archived reaction."""
     path = tmp_path / "springs.nc"
-    tc.run(springy_table(1000.0), samples=50, out=path)
+    tc.run(compiled(springy_table(1000.0)), samples=50, out=path)
     assert_gaps_recompute(path)
     with tc.open_archive(path) as tree:
         assert tree["reaction"].attrs["units"] == "N"

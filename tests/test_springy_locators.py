@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from tests.helpers import simulate
+from tests.helpers import compiled, simulate
 from tolcontact.testing import assert_gaps_recompute
 from tolcontact.vocabulary import CORRECTED, Status
 
@@ -70,7 +70,7 @@ def test_turned_frames_and_other_units_change_nothing():
 
 def test_forces_follow_from_the_archive_alone(tmp_path):
     path = tmp_path / "bar.nc"
-    tc.run(bar_on_springs(), samples=30, out=path)
+    tc.run(compiled(bar_on_springs()), samples=30, out=path)
     assert_gaps_recompute(path)
     with tc.open_archive(path) as tree:
         sample = tree["sample"].to_dataset()

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from tests.helpers import simulate
+from tests.helpers import compiled, simulate
 from tolcontact.testing import assert_gaps_recompute
 from tolcontact.vocabulary import CORRECTED, Status
 
@@ -64,7 +64,7 @@ def test_turned_frames_and_other_units_change_nothing():
 def test_a_block_lifts_off_its_pad_as_a_layer_without_tension_says(tmp_path):
     """Pressed near an end it carries over a length 3 (b/2 - e); also by a second method from the archived springs."""
     offset, path = 40.0, tmp_path / "pad.nc"
-    tc.run(padded_block((offset, 0), points=80), samples=3, out=path, solver="daqp")
+    tc.run(compiled(padded_block((offset, 0), points=80), solver="daqp"), samples=3, out=path)
     assert_gaps_recompute(path)
     with tc.open_archive(path) as tree:
         assert (tree["status"].values == Status.RESOLVED).all()
@@ -143,7 +143,7 @@ def test_a_pressed_pad_is_not_in_conflict():
     for name, x, own, facing in (("left", 50, "-x", "+x"), ("right", 219.9, "+x", "-x")):
         wall = model.part(name, tc.Box(50, 300, 50), at=(x, 0, 50), fixed=True)
         model.contact(name, moving=block.face(own), reference=wall.face(facing))
-    results = tc.run(model, samples=5, solver="daqp")
+    results = tc.run(compiled(model, solver="daqp"), samples=5)
     assert (results["status"] == Status.NOT_ASSEMBLABLE).any()
     conflicts = dict(zip(results["pair"].values.tolist(), tc.summarize(results)["conflicts"].values.tolist(), strict=True))
     assert conflicts["pad"] == 0 and conflicts["left"] > 0 and conflicts["right"] > 0

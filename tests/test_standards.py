@@ -170,13 +170,13 @@ def bored(tolerance, standard: str, *own, mated: bool = False, holes: int = 1) -
 def test_a_datum_at_maximum_material_has_the_play_of_its_gauge():
     """A bore 8 +0.2/0 as datum B(M), and a hole 0.1 to it: 0.05 and 0.1 in the worst case, and sums of variances."""
     model = bored(tc.Position(0.1, "A|B(M)"), "ASME")
-    program, run = simulate(model, samples=20_000, solver="daqp")
+    program, run = simulate(model, samples=8000, solver="daqp")
     assert [label for label in program.nominal.contributors if "mobility" in label] == [
         "plate.bore.mobility of datum B of A|B(M): shift x", "plate.bore.mobility of datum B of A|B(M): shift y",
     ]  # fmt: skip
     worst = tc.analyses.worst_case(model)["worst"].sel(state="raw").values + 60
     np.testing.assert_allclose(worst, [[-0.15, 0.15]] * 2, atol=1e-7)
-    _, still = simulate(bored(tc.Position(0.1, "A|B"), "ASME"), samples=20_000, solver="daqp")
+    _, still = simulate(bored(tc.Position(0.1, "A|B"), "ASME"), samples=8000, solver="daqp")
     alone = still["measured"][:, CORRECTED, 0].var()
     # 99.73 % of a normal distribution in a plane lie within 3.44 sigma; half of the size's departure is the radius.
     departure = scipy.stats.uniform(0, 0.2)

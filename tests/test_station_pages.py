@@ -5,6 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests.cases import stations as cases
+from tests.helpers import compiled
 from tests.test_report import data_of, unpacked
 from tolcontact.discretization import discretize
 from tolcontact.report import write_page, write_view
@@ -16,7 +17,7 @@ SCENES = {"weld": ([0, 1], ["lap"], ["step"]), "check": ([0, 1, 2], [], ["flush"
 def pages(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     model = cases.rail()
-    results = tc.run(model, samples=60, seed=1, solver="daqp", surfaces=0)
+    results = tc.run(compiled(model, solver="daqp"), samples=60, seed=1, surfaces=0)
     write_page(results, tc.summarize(results), folder / "report.html")
     write_view(model, discretize(model), [], folder / "view.html")
     return folder
@@ -34,7 +35,7 @@ def test_a_page_has_one_scene_for_each_station(kind, pages):
 def test_worst_cases_stand_in_their_stations(tmp_path):
     """The scene of a station has the poses of worst cases: those that give the measure again, of the last station too."""
     path, model = tmp_path / "rail.nc", cases.rail()
-    tc.run(model, samples=20, seed=1, solver="daqp", surfaces=0, out=path).close()
+    tc.run(compiled(model, solver="daqp"), samples=20, seed=1, surfaces=0, out=path).close()
     worst = tc.analyses.worst_case(model, samples=64, solver="daqp", into=path)
     with tc.open_archive(path) as tree:
         write_page(tree, tc.summarize(tree), tmp_path / "report.html")

@@ -233,7 +233,7 @@ def on_points(a, b):
 
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.3, -0.2, 0.5)])
 def test_a_joint_is_located_by_three_faces_of_its_parts(turn):
-    programs = [tc.build(welded(scheme, turn=turn)) for scheme in (on_faces, on_points)]
+    programs = [compiled(welded(scheme, turn=turn)) for scheme in (on_faces, on_points)]
     locators = [program.nominal.locators for program in programs]
     order = [np.lexsort(np.round(each.points[12:], 6).T) for each in locators]
     points, directions = ([getattr(each, name)[12:][rows] for each, rows in zip(locators, order, strict=True)]

@@ -113,7 +113,7 @@ def test_ctrl_c_prints_the_answer_so_far(tmp_path):
     process = start(command, cwd=tmp_path)
     while "so far: " not in (line := process.stderr.readline()):
         assert line, "it has ended"
-    time.sleep(1)
+    time.sleep(0.2)
     process.send_signal(signal.SIGINT)
     done = finish(process)
     assert done.returncode == 130 and "COARSE, stopped: " in done.stdout and "corner height" in done.stdout

@@ -7,7 +7,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 
 CLEARANCE, DEVIATION = 0.15, 0.1
 SOLVERS = ("daqp", *nightly("qpoases", "osqp", "proxqp", "highs", "piqp"))
@@ -41,7 +41,9 @@ def clipped(frame, lever):
 @pytest.mark.parametrize(("frame", "lever"), [("moved and turned", 0.0), *nightly(("upright", 0.0), ("upright", 3000.0))])
 def test_what_lies_beyond_a_stop_is_nothing(solver, resolution, frame, lever):
     method = tc.Method(resolution=resolution, objective="all points")
-    with tc.run(clipped(FRAMES[frame], lever), samples=2000, solver=solver, method=method, surfaces=0, fields="none") as run:
+    with tc.run(
+        compiled(clipped(FRAMES[frame], lever), solver=solver, method=method), samples=2000, surfaces=0, fields="none"
+    ) as run:
         summary, height = tc.summarize(run), run["measured"].sel(state="corrected", measure="lower").values
         v = run["sample"]["deviation"].sel(contributor="v").values
     clip = np.clip(v, 0, CLEARANCE)
@@ -66,12 +68,12 @@ def test_a_value_of_many_realizations_on_a_limit_is_inside():
     a.population(pd.DataFrame({"z": np.repeat([-0.2, 0.0, 0.2], [20, 50, 30])}), {"block.Z": "z"})
     for name, limits in {"on": (-0.2, 0.2), "upper": (None, 0.0), "within": (-0.2, 0.1)}.items():
         a.measure(name, block.point(5, 5, 10), along="z", limits=limits)
-    run = tc.run(a, samples=500, solver="daqp", surfaces=0, fields="none")
+    run = tc.run(compiled(a, solver="daqp"), samples=500, surfaces=0, fields="none")
     v = run["sample"]["deviation"].sel(contributor="block.Z").values
     shares = tc.summarize(run).statistic_value.sel(state="corrected", statistic="outside limits", interval="estimate")
     assert shares.sel(measure=["on", "upper", "within"]).values.tolist() == [0.0, (v > 0).mean(), (v > 0).mean()]
 
 
 def test_the_accuracy_of_a_measure_grows_with_its_lever():
-    accuracies = [float(tc.build(clipped(FRAMES["upright"], lever), solver="daqp").accuracies[0]) for lever in (0.0, 3000.0)]
+    accuracies = [float(compiled(clipped(FRAMES["upright"], lever), solver="daqp").accuracies[0]) for lever in (0.0, 3000.0)]
     assert accuracies[0] == pytest.approx(1e-8, rel=0.5) and 50 < accuracies[1] / accuracies[0] < 500

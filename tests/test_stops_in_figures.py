@@ -9,7 +9,7 @@ from rich.console import Console
 from scipy import special, stats
 
 import tolcontact as tc
-from tests.helpers import nightly
+from tests.helpers import compiled, nightly
 from tolcontact.report import summary_text
 
 
@@ -32,7 +32,7 @@ def verdicts(summary):
 
 
 def simulated(model, samples, seed=1, **options):
-    return tc.run(model, samples=samples, seed=seed, solver="daqp", surfaces=0, fields="none", **options)
+    return tc.run(compiled(model, solver="daqp"), samples=samples, seed=seed, surfaces=0, fields="none", **options)
 
 
 def test_a_stop_that_no_realization_leaves_has_no_interval_of_length_zero():
@@ -77,7 +77,7 @@ def test_solvers_agree_on_every_figure_of_a_measurement_at_its_stop(share):
     """The values of three solvers at a stop scatter by 1e-17 to 1e-13 mm, on either side."""
     model, limits = resting(share, limits=(0, 0.2)), {"rtol": 1e-6, "atol": 1e-6, "equal_nan": True}
     first, *others = (
-        tc.summarize(tc.run(model, samples=300, seed=3, surfaces=0, fields="none", solver=solver))
+        tc.summarize(tc.run(compiled(model, solver=solver), samples=300, seed=3, surfaces=0, fields="none"))
         for solver in ("qpoases", "daqp", "graph")
     )
     for other in others:

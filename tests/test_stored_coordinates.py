@@ -11,7 +11,7 @@ from tests.helpers import FIXED, call, compiled, nightly
 from tolcontact.stored_coordinates import printed_spacing
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 
-QUICK = {"samples": 60, "surfaces": 0, "fields": "none"}
+QUICK = {"samples": 24, "surfaces": 0, "fields": "none"}
 KEPT = QUICK | {"keep": "all"}
 BOX = trimesh.creation.box(bounds=[(0, 0, 0), (20, 12.5, 8)])
 TURNED = trimesh.Trimesh(BOX.vertices, BOX.faces).apply_transform(trimesh.transformations.euler_matrix(0.3, 0.5, 1.1))

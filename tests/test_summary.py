@@ -7,6 +7,7 @@ from rich.console import Console
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import compiled
 from tolcontact.errors import ArchiveError
 from tolcontact.report import summary_text
 
@@ -20,7 +21,7 @@ def run():
     upper, bottom = a.parts[-1], a.parts[0]
     a.measure("thickness", bottom.point(0, 0, 10), to=upper.point(0, 0, 10), along="z", tolerance=1)
     a.measure("free", upper.point(0, 0, 10), along="x")
-    with tc.run(a, samples=20, solver="daqp") as results:
+    with tc.run(compiled(a, solver="daqp"), samples=20) as results:
         return results.load()
 
 
@@ -133,7 +134,7 @@ def test_the_smallest_range_is_that_of_a_locator_or_of_a_measure_in_mm(run):
     a = cases.one_dimensional(0)
     block = a.parts[1]
     a.measure("tilt", lambda poses: poses.rotation(block)[2, 0], units="rad", tolerance=0.01)
-    with tc.run(a, samples=5, solver="daqp") as results:
+    with tc.run(compiled(a, solver="daqp"), samples=5) as results:
         assert tc.summarize(results).attrs["smallest_range"] == 6.0
 
 
@@ -177,7 +178,7 @@ def test_parts_that_do_not_move_have_no_row_of_fields():
     a.measure("height", block.point(50, 0, 10), along="z")
     console = Console(width=100)
     with console.capture() as printed:
-        console.print(summary_text(tc.summarize(tc.run(a, samples=20, solver="daqp"))))
+        console.print(summary_text(tc.summarize(tc.run(compiled(a, solver="daqp"), samples=20))))
     _, _, fields = printed.get().partition("6 sigma of the displacement magnitude")
     fields, _, _ = fields.partition("\ncontact\n")
     assert "block" in fields and "table" not in fields

@@ -56,7 +56,7 @@ def test_what_a_killed_run_left_is_taken_over(tmp_path):
     out = tmp_path / "out.nc"
     for name in (".out.nc.lock", ".out.nc.0123abcd.part", ".out.nc.rows", ".out.nc.checkpoint"):
         (tmp_path / name).write_bytes(b"left")
-    tc.run(cases.stack(), samples=10, solver="daqp", out=out).close()
+    tc.run(compiled(cases.stack(), solver="daqp"), samples=10, out=out).close()
     assert list(tmp_path.iterdir()) == [out]
 
 
@@ -129,7 +129,7 @@ def test_a_run_that_is_stopped_before_it_began_leaves_nothing(tmp_path):
 
 def test_a_read_only_archive_is_not_replaced(tmp_path):
     path = tmp_path / "out.nc"
-    tc.run(cases.stack(), samples=10, solver="daqp", out=path).close()
+    tc.run(compiled(cases.stack(), solver="daqp"), samples=10, out=path).close()
     path.chmod(0o444)
     if os.access(path, os.W_OK):
         pytest.skip("this user may write to read-only files")

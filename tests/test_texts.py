@@ -17,7 +17,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies
 
 import tolcontact as tc
-from tests.helpers import call, nightly
+from tests.helpers import call, compiled, nightly
 from tolcontact.report import write_view
 from tolcontact.texts import csv_cell, literal, sheet_cell, shown, shown_name
 
@@ -106,7 +106,7 @@ def judge(text):
     model.measure(text, block.point(0, 0, 10), along="z", tolerance=1)
     with tempfile.TemporaryDirectory() as folder:
         try:
-            tc.run(model, samples=20, surfaces=0, fields="none", solver="daqp", out=Path(folder) / "run.nc").close()
+            tc.run(compiled(model, solver="daqp"), samples=20, surfaces=0, fields="none", out=Path(folder) / "run.nc").close()
         except tc.ModelError as error:
             assert repr(text)[1:40] in str(error) or shown(text)[:40] in str(error)
             return

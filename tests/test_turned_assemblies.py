@@ -11,6 +11,7 @@ from tests.helpers import nightly, simulate
 from tolcontact.discretization import discretize
 
 THICKNESS = 4.0
+SAMPLES = 40
 SIDES = 96  # of the polygons that stand for circles
 TURNS = [Rotation.from_rotvec(turn) for turn in ((0.3, -1.1, 0.7), (np.pi / 2, 0, 0), (2.0, 0.4, -1.3))]
 SHIFT = np.array((31.0, -17.0, 90.0))  # mm
@@ -135,10 +136,10 @@ def test_turned_faces_keep_their_points_and_weights(name, overhang):
 @pytest.mark.parametrize(("name", "overhang"), [("L", False), ("ring", True), *nightly(("rectangle", True), ("disc", False))])
 def test_realizations_of_turned_assemblies_are_the_same(name, overhang, resolution):
     method = tc.Method(resolution=resolution)
-    _, run = simulate(plates(name, overhang=overhang), samples=100, solver="daqp", method=method)
+    _, run = simulate(plates(name, overhang=overhang), samples=SAMPLES, solver="daqp", method=method)
     poses = run["poses"][:, 1, 1]
     for turn in TURNS:
-        _, turned = simulate(plates(name, turn, overhang), samples=100, solver="daqp", method=method)
+        _, turned = simulate(plates(name, turn, overhang), samples=SAMPLES, solver="daqp", method=method)
         Q, R = turn.as_matrix(), turned["poses"][:, 1, 1, :9].reshape(-1, 3, 3)
         R_back = Q.T @ R @ Q
         t_back = (turned["poses"][:, 1, 1, 9:] + R @ SHIFT - SHIFT) @ Q

@@ -7,6 +7,7 @@ from scipy.stats import binom
 
 import tolcontact as tc
 from tests.cases import toleranced
+from tests.helpers import compiled
 from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
 from tolcontact.variation import Draws
@@ -84,7 +85,7 @@ def test_a_worst_case_lies_in_an_uneven_zone_and_in_the_narrower_one_within_it()
 def test_an_archive_says_how_much_of_a_zone_is_outside(tmp_path):
     """So a run that was begun when such zones were drawn about the nominal surface is not resumed."""
     model, path = toleranced.block_with("top", tc.Profile(0.3, "A", outside=UPPER)), tmp_path / "block.nc"
-    tc.run(model, samples=20, seed=1, surfaces=0, out=path).close()
+    tc.run(compiled(model), samples=20, seed=1, surfaces=0, out=path).close()
     with netCDF4.Dataset(path, "r+") as file:
         texts = file["sample"]["distribution"]
         assert "profile 0.3 mm, 0.25 mm of it outside, to A; 99.73 % inside" in list(texts[:])

@@ -8,7 +8,7 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call
+from tests.helpers import call, compiled
 from tests.shapes import patch, shape, triangles_of
 from tests.test_report import data_of, picture
 from tolcontact.discretization import discretize
@@ -69,7 +69,7 @@ def test_the_command_shows_models_step_files_and_archives(tmp_path):
         assert (
             all(face["snippet"].startswith("face(tc.select.Brep((") for face in parts[-1]["described"]) or what.suffix == ".py"
         )
-    tc.run(cases.stack(), samples=10, solver="daqp", out=tmp_path / "stack.nc").close()
+    tc.run(compiled(cases.stack(), solver="daqp"), samples=10, out=tmp_path / "stack.nc").close()
     done = call(tmp_path, "view", tmp_path / "stack.nc", "--out", tmp_path / "run.html")
     assert done.returncode == 0 and "Contact and certificates" in (tmp_path / "run.html").read_text()
     done = call(tmp_path, "view", tmp_path / "nothing.step", "--out", tmp_path / "no.html")

@@ -54,7 +54,7 @@ def test_the_other_checked_rows_are_drawn(archive):
 
 def test_rows_that_are_not_certified_are_not_checked():
     """A block that its locators hold in a wall, but for few realizations."""
-    tree = tc.run(cases.block_on_six(0.2), samples=60, solver="daqp", method=SEATED, surfaces=60)
+    tree = tc.run(compiled(cases.block_on_six(0.2), solver="daqp", method=SEATED), samples=60, surfaces=60)
     certified = np.flatnonzero(np.isin(tree["status"].values, [tc.Status.UNTOUCHED, tc.Status.RESOLVED]))
     assert 2 < len(certified) < 30
     rows = checked(tree)
@@ -116,17 +116,17 @@ def test_the_moments_of_faces_give_the_objective(tmp_path, model):
 def test_units_of_measures():
     a = cases.one_dimensional(6)
     block = a.parts[1]
-    alone = tc.run(a, samples=5, solver="daqp")
+    alone = tc.run(compiled(a, solver="daqp"), samples=5)
     assert alone["measured"].attrs["units"] == "mm"
     a.measure("tilt", lambda poses: poses.rotation(block)[2, 0], units="rad")
-    mixed = tc.run(a, samples=5, solver="daqp")
+    mixed = tc.run(compiled(a, solver="daqp"), samples=5)
     assert mixed["measured"].attrs["units"] == "1" and mixed["measure_units"].values.tolist() == ["mm", "rad"]
     assert np.isnan(mixed["measure_tolerance"].values).all()
     turned = tc.Assembly("turned")
     only = turned.part("only", tc.Box(10, 10, 10))
     turned.locate(only, tc.three_two_one(only.face("-z"), only.face("-y"), only.face("-x"), inset=1), tolerance=0.1)
     turned.measure("tilt", lambda poses: poses.rotation(only)[2, 0], units="rad")
-    assert tc.run(turned, samples=5)["measured"].attrs["units"] == "rad"
+    assert tc.run(compiled(turned), samples=5)["measured"].attrs["units"] == "rad"
 
 
 def test_units_of_contributors_and_limits(tmp_path):
@@ -138,14 +138,14 @@ def test_units_of_contributors_and_limits(tmp_path):
         ("deviation", "tolerance_range", "mean_shift"),
         ("measured", "measure_nominal", "measure_tolerance", "measure_lower_limit", "measure_upper_limit", "measure_accuracy"),
     )
-    tc.run(a, samples=5, out=tmp_path / "run.nc").close()
+    tc.run(compiled(a), samples=5, out=tmp_path / "run.nc").close()
     with xr.open_datatree(tmp_path / "run.nc") as tree:
         for group, names in zip(("sample", ""), named, strict=True):
             assert {tree[f"{group}/{name}"].attrs["units"] for name in names} == {"in"}
     worst = tc.analyses.worst_case(a, samples=16)
     assert "units" not in worst["measured"].attrs and worst["measure_units"].values.tolist() == ["in"]
     a.variable("heat", 4, units="K", nominal=20)
-    mixed = tc.run(a, samples=5)
+    mixed = tc.run(compiled(a), samples=5)
     assert {mixed[f"sample/{name}"].attrs["units"] for name in of_contributors} == {"1"}
     assert mixed["sample/contributor_units"].values.tolist() == ["in", "K"]
     assert {mixed[name].attrs["units"] for name in of_measures} == {"in"}
@@ -153,7 +153,7 @@ def test_units_of_contributors_and_limits(tmp_path):
 
 
 def test_the_sample_names_every_locator_with_its_tolerance_and_stiffness():
-    tree = tc.run(cases.stopped(), samples=10, solver="daqp")
+    tree = tc.run(compiled(cases.stopped(), solver="daqp"), samples=10)
     sample = tree["sample"].to_dataset()
     assert sample["locator"].values.tolist() == [f"block.{name}" for name in ("Z1", "Z2", "Z3", "Y1", "Y2", "X", "stop 0")]
     assert (sample["tolerance_range"].values == 1).all() and set(sample["distribution"].values) == {"normal"}
@@ -171,7 +171,7 @@ def test_a_distribution_of_ones_own_is_named():
     block = a.part("block", tc.Box(10, 10, 10), fixed=True)
     a.locate(block, [tc.Locator("Z", (5, 5, 0), "z", stats.gamma(2, scale=0.1)), *cases.translating(0)[1:]])
     a.measure("height", block.point(0, 0, 10), along="z")
-    sample = tc.run(a, samples=5, solver="daqp")["sample"].to_dataset()
+    sample = tc.run(compiled(a, solver="daqp"), samples=5)["sample"].to_dataset()
     assert sample["distribution"].values.tolist()[0] == "gamma" and np.isnan(sample["tolerance_range"].values[0])
 
 
@@ -188,7 +188,7 @@ def test_means_of_contributors_are_those_of_their_distributions():
     block.feature("width", block.face("+x"), block.face("-x"), tc.Size(10, 0.2, -0.1, cp=1, cpk=0.5))
     a.variable("warmth", tc.Tolerance(distribution=stats.uniform(1, 4)), drives={"block.Z": 0.0}, units="K")
     a.measure("height", block.point(0, 0, 10), along="z")
-    sample = tc.run(a, samples=20_000, solver="daqp", surfaces=0)["sample"].to_dataset()
+    sample = tc.run(compiled(a, solver="daqp"), samples=20_000, surfaces=0)["sample"].to_dataset()
     drawn, said = sample["deviation"], sample["mean_shift"]
     assert len({round(float(one), 9) for one in said}) >= 5
     assert (abs(drawn.mean("realization") - said) <= 4.5 * drawn.std("realization") / np.sqrt(20_000) + 1e-15).all()

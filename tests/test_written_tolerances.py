@@ -8,7 +8,7 @@ from jsonschema import Draft202012Validator
 
 import tolcontact as tc
 from tests.cases import toleranced
-from tests.helpers import assembly_of, json_schema, simulate
+from tests.helpers import assembly_of, compiled, json_schema, simulate
 
 
 def block(zone, **measure):
@@ -127,7 +127,7 @@ def test_a_measure_has_limits_around_its_nominal_value():
         assert tc.check(model) == ()
         assert model.measures[0].bounds(5.0) == pytest.approx((5 + limits[0], 5 + limits[1]))
         assert model.measures[0].width == pytest.approx(limits[1] - limits[0])
-    results = tc.run(block(0.2, tolerance="+0.1/-0.05", absolute=True), samples=100, surfaces=0)
+    results = tc.run(compiled(block(0.2, tolerance="+0.1/-0.05", absolute=True)), samples=100, surfaces=0)
     summary = tc.summarize(results)
     assert (float(summary.measure_lower[0]), float(summary.measure_upper[0])) == pytest.approx((9.95, 10.1))
     assert tc.io.model_of(results).measures[0].tolerance == (-0.05, 0.1)

@@ -8,6 +8,7 @@ from scipy.stats import binom, norm
 
 import tolcontact as tc
 from tests.cases import Frame, toleranced
+from tests.helpers import compiled
 from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
 from tolcontact.features import Freedom
@@ -58,9 +59,9 @@ def test_a_population_is_inside_its_zones_as_stated_in_any_frame(name):
         stated, inside = found.stated_share[zone], found.share[zone] * SAMPLES
         low, high = binom.interval(0.9999, SAMPLES, stated if np.isfinite(stated) else 0.9973)
         assert low <= inside and (inside <= high or not np.isfinite(stated)), tolerance
-    moved = measured_back(toleranced.EVERY[name](MOVED), SAMPLES, seed=3)
-    assert (moved.share == found.share).all()
-    assert moved.needed_width == pytest.approx(found.needed_width, rel=1e-9)
+    still, moved = (measured_back(toleranced.EVERY[name](frame), 2000, seed=3) for frame in (toleranced.STILL, MOVED))
+    assert (moved.share == still.share).all()
+    assert moved.needed_width == pytest.approx(still.needed_width, rel=1e-9)
 
 
 def test_the_bonus_fills_the_zone_of_each_part():
@@ -147,7 +148,7 @@ def test_a_mean_shift_has_a_side():
     assert tc.Size(10, 0.1, side="down", cp=1.33, cpk=1.0).tolerance.mean_shift == pytest.approx(-shift)
     for side, sign in (("up", 1), ("down", -1)):
         block = toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side=side))
-        means = [freedom.mean for freedom in tc.build(block).draws.contributors if freedom.mean]
+        means = [freedom.mean for freedom in compiled(block).draws.contributors if freedom.mean]
         assert len(means) == 1 and means[0] * sign > 0
     assert "side is 'left'; expected up, down or either" in list(tc.Tolerance(0.2, cp=1, cpk=0.9, side="left").faults())
     assert any("side is given without cpk" in fault for fault in tc.Tolerance(0.2, side="up").faults())
@@ -185,7 +186,7 @@ def test_lots_on_either_side_widen_a_measure_and_stack_up_arithmetically():
 
 def test_the_side_of_a_feature_may_be_unknown():
     known, either = (
-        tc.build(toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side=side))).draws.contributors
+        compiled(toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side=side))).draws.contributors
         for side in ("up", "either")
     )
     moved = [(one, other) for one, other in zip(known, either, strict=True) if one.mean]
@@ -193,7 +194,7 @@ def test_the_side_of_a_feature_may_be_unknown():
     for one, other in moved:
         assert other.lot_distance == pytest.approx(one.mean) and other.mean == 0
         assert other.variance == pytest.approx(one.spread**2 + one.mean**2)
-    words = tc.build(toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side="either"))).draws.in_words
+    words = compiled(toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side="either"))).draws.in_words
     assert words == ["means off centre by cpk: block.top.offset up or down"]
 
 
