@@ -63,6 +63,12 @@ def simulate(model, samples=200, seed=1, block=1000, build=compiled, **options):
     return program, joined(simulate_blocks(program, samples=samples, seed=seed, block=block))
 
 
+def realizations(program, samples, seed=1):
+    """What a run has of each realization, as its results have it, without an archive."""
+    rows = tc.simulate(program, samples, seed=seed).compute()
+    return xr.DataTree.from_dict({"/": rows.drop_vars("deviation"), "/sample": rows[["deviation"]]})
+
+
 def joined(blocks):
     """Arrays (realization, ...) by name, of blocks one after the other."""
     whole = vars(Block.joined(blocks))

@@ -14,7 +14,7 @@ from rich.console import Console
 from scipy.stats import norm
 
 import tolcontact as tc
-from tests.helpers import assembly_of, call, compiled
+from tests.helpers import assembly_of, call, compiled, realizations
 from tests.step_files import step_block
 from tolcontact.report import summary_text
 from tolcontact.testing import assert_no_clashes, assert_resolved
@@ -212,7 +212,7 @@ def test_a_second_pair_at_the_wall_ends_the_doubt():
     face = base.face("+x", tc.select.Inside((-1, -1, 10), (1, 61, 41)))
     assembly.contact("wall", moving=block.face("-x"), reference=face)
     assert not warned(assembly)
-    assert_resolved(tc.run(compiled(assembly), samples=200, seed=1, surfaces=0))
+    assert_resolved(realizations(compiled(assembly), samples=200, seed=1))
 
 
 def test_linearized_runs_say_that_bodies_were_not_tested():

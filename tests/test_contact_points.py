@@ -8,7 +8,7 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import ALL_POINTS, compiled, nightly, simulate
+from tests.helpers import ALL_POINTS, compiled, nightly, realizations, simulate
 from tolcontact.discretization import discretize
 from tolcontact.statistics import estimate_of
 
@@ -80,7 +80,7 @@ def test_halving_the_spacing_moves_measures_on_curved_faces_by_less_than_their_i
     programs = [compiled(cases.bar_in_a_half_pipe(spacing), solver="daqp", method=method) for spacing in (6, 3)]
     few, many = (len(program.nominal.pairs[0].P_m) for program in programs)
     assert many > 3 * few
-    coarse, fine = (tc.run(program, samples=300, surfaces=0, fields="none") for program in programs)
+    coarse, fine = (realizations(program, samples=300) for program in programs)
     for measure in coarse["measure"].values:
         for statistic in ("mean", "standard deviation"):
             _, lower, upper = estimate_of(coarse, measure, statistic)

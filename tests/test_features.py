@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tests.cases import Frame, toleranced
-from tests.helpers import compiled, nightly
+from tests.helpers import compiled, nightly, realizations
 from tests.population_referee import measured_back
 from tests.shapes import shape
 from tolcontact.discretization import discretize
@@ -30,7 +30,7 @@ def drawn(results, label):
 
 @pytest.mark.parametrize("frame", [toleranced.STILL, MOVED], ids=["still", "moved"])
 def test_points_of_a_plane_move_as_its_offset_and_tilts_say(frame):
-    results = tc.run(compiled(toleranced.block_with("top", tc.Profile(0.3, "A|B|C"), frame=frame)), samples=500)
+    results = realizations(compiled(toleranced.block_with("top", tc.Profile(0.3, "A|B|C"), frame=frame)), samples=500)
     z, a, b = (drawn(results, f"block.top.{name}") for name in ("offset", "tilt x", "tilt y"))
     measured = results.measured.sel(state="raw")
     expected = {"corner": z + a + b, "middle": z, "edge": z + a}
@@ -116,7 +116,7 @@ def test_locators_follow_the_faces_that_they_stand_against():
         for name, point in {"middle": (25, 15, 0), "corner": (0, 0, 0)}.items():
             a.measure(f"{part.name} {name}", part.point(*point), along="z")
     a.measure("stays", foot.point(25, 15, 0), along="z")
-    results = tc.run(compiled(a), samples=300)
+    results = realizations(compiled(a), samples=300)
     measured = results.measured.sel(state="raw")
     for name in ("p0", "p1"):
         z, x, y = (drawn(results, f"{name}.foot.{freedom}") for freedom in ("offset", "tilt x", "tilt y"))
@@ -193,7 +193,7 @@ def test_diameters_vary_as_offsets(points, solver):
 
 
 def test_axes_of_an_archive_are_where_the_position_says():
-    results = tc.run(compiled(toleranced.ring_with("bore", tc.Position(0.2, "A|B"))), samples=300)
+    results = realizations(compiled(toleranced.ring_with("bore", tc.Position(0.2, "A|B"))), samples=300)
     x = drawn(results, "ring.bore.shift x") + drawn(results, "ring.bore.tilt x")
     assert np.abs(results.measured.sel(state="raw", measure="x").values - x).max() < 1e-6
 
@@ -317,7 +317,7 @@ def test_regions_of_one_face_are_features_of_their_own():
         a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=0)
         a.contact(name, moving=block.face("-z"), reference=base.face("+z", left if x < 50 else right))
         a.measure(name, block.point(0, 0, 0), along="z")
-    moved = tc.run(compiled(a, solver="daqp", method=EXACT), samples=100).measured.sel(state="corrected").values
+    moved = realizations(compiled(a, solver="daqp", method=EXACT), samples=100).measured.sel(state="corrected").values
     assert np.abs(moved[:, 0]).max() > 0.1 and np.abs(moved[:, 1]).max() == 0
     base.feature("right", base.face("+z", right), tc.Profile(0.5, "A"))
     assert not tc.check(a)
@@ -332,7 +332,7 @@ def test_points_and_locators_of_a_pair_of_planes_are_on_their_own_face():
     a.locate(tab, [*(tc.Locator(f"R{k}", p, d, 0) for k, (p, d) in enumerate(rest)), *sides])
     a.measure("width", width.point(10, 0, 4), to=width.point(10, 10, 4), along="y")
     a.measure("low", width.point(10, 0, 4), along="y")
-    results = tc.run(compiled(a), samples=100)
+    results = realizations(compiled(a), samples=100)
     size, measured = drawn(results, "tab.width.size"), results.measured.sel(state="raw")
     assert np.abs(measured.sel(measure="width") - 10 - size).max() < 1e-9  # from low to high
     assert np.abs(measured.sel(measure="low")).max() < 1e-9  # it stands against its locators

@@ -7,7 +7,7 @@ from scipy.stats import binom
 
 import tolcontact as tc
 from tests.cases import Frame, floating
-from tests.helpers import compiled, nightly
+from tests.helpers import compiled, nightly, realizations
 from tolcontact.errors import ModelError
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import Status
@@ -66,7 +66,7 @@ def test_a_hinge_pin_tilts_between_its_knuckles():
 
 @pytest.mark.slow
 def test_a_lid_finds_its_place_over_four_studs():
-    results = tc.run(compiled(floating.lid_on_studs(position=0.1, clearance=0.3), solver="daqp"), samples=150)
+    results = realizations(compiled(floating.lid_on_studs(position=0.1, clearance=0.3), solver="daqp"), samples=150)
     assert_resolved(results)
     x = results.measured.sel(state="corrected", measure="x").values
     holes, studs, room = floating.drawn_of_lid(results)
@@ -97,7 +97,7 @@ def test_the_share_that_cannot_be_assembled_is_that_of_an_independent_computatio
     """Two hole patterns, position at maximum material or without: the least of the largest misfits, by shifting and turning."""
     words = {"material": "M"} if material else {}
     model = floating.lid_on_studs(position=0.35, sizes=0.15, clearance=0.25, seating=False, **words)
-    results = tc.run(compiled(model, solver="daqp"), samples=120, surfaces=0, fields="none")
+    results = realizations(compiled(model, solver="daqp"), samples=120)
     status = results.status.values
     assert np.isin(status, [Status.UNTOUCHED, Status.RESOLVED, Status.NOT_ASSEMBLABLE]).all()
     holes, studs, room = floating.drawn_of_lid(results)
@@ -134,7 +134,7 @@ def most_room(holes, studs, room) -> float:
 def test_a_part_that_nothing_holds_is_not_certified():
     a = floating.floating_peg_in_a_hole()
     a.force("pull out", at=a.parts[1].point(0, 0, 0), vector=(0, 0, 0.001))
-    held = tc.run(compiled(a), samples=20)
+    held = realizations(compiled(a), samples=20)
     assert_resolved(held)  # along z it is held both ways
     loose = tc.Assembly("loose", method=floating.SEATED)
     table = loose.part("table", tc.Box(50, 50, 5), fixed=True)
@@ -145,7 +145,7 @@ def test_a_part_that_nothing_holds_is_not_certified():
     loose.measure("z", block.point(0, 0, 0), along="z")
     results = tc.run(loose, samples=5)
     assert (results.status == Status.NOT_CONVERGED).all()
-    still = tc.run(compiled(loose, method=tc.Method(resolution="exact")), samples=5)
+    still = realizations(compiled(loose, method=tc.Method(resolution="exact")), samples=5)
     assert (still.status == Status.UNTOUCHED).all() and np.abs(still.measured).max() == 0
 
 
@@ -160,7 +160,7 @@ def test_locators_of_a_floating_part_move_it_as_little_as_they_can():
         a.contact("seat", moving=block.face("-z"), reference=table.face("+z"), within=5)
         for axis, along in (("x", (1, 0, 0)), ("y", (0, 1, 0)), ("z", (0, 0, 1))):
             a.measure(axis, block.point(33, 4, 5), along=frame.along(*along))
-        results = tc.run(compiled(a), samples=50)
+        results = realizations(compiled(a), samples=50)
         x, y, z = results.measured.sel(state="raw").values.T
         assert np.abs(x - drawn(results, "block.X")).max() < 1e-9 and np.abs(y).max() < 1e-9
         assert np.abs(z - drawn(results, "block.Z")).max() < 1e-9
@@ -210,7 +210,7 @@ def test_one_sided_locators_hold_a_floating_part_as_they_hold_any_other():
         a.measure("height", block.point(50, 20, 0), along="z")
         return a
 
-    afloat, fixed = (tc.run(compiled(on_three_supports(k)), samples=200, seed=1, surfaces=0) for k in (True, False))
+    afloat, fixed = (realizations(compiled(on_three_supports(k)), samples=200, seed=1) for k in (True, False))
     assert_resolved(afloat)
     heights = [results.measured.sel(state="corrected").values for results in (afloat, fixed)]
     assert np.abs(heights[0] - heights[1]).max() < 1e-9

@@ -94,7 +94,7 @@ def test_a_journal_that_was_damaged_is_refused_and_left_alone(program, tmp_path)
         assert results.sizes["realization"] == 8000
 
 
-@pytest.mark.parametrize("step", [3000, *nightly(15)])
+@pytest.mark.parametrize("step", [1200, *nightly(15)])
 def test_a_run_may_be_killed_at_any_of_its_writes(step, tmp_path):
     done = run(script("kill_at_each_write", tmp_path, step))
     assert done.returncode == 0, done.stderr

@@ -9,7 +9,7 @@ import pytest
 import tolcontact as tc
 from studies.certificates.ends import judged, scene
 from tests.cases.laps import CASES, case
-from tests.helpers import compiled, nightly
+from tests.helpers import compiled, nightly, realizations
 from tests.test_ends import FAULTS
 from tolcontact.vocabulary import Status
 
@@ -46,7 +46,7 @@ def test_whole_surfaces_of_random_bodies(seed):
 def test_whole_bodies_touch_as_the_planes_between_them(name):
     """The same depth before contact, and the same status, as of underside and top, declared by name."""
     whole, *partly = (
-        tc.run(program_of(name, **faces), samples=60, seed=2, surfaces=0, fields="none")
+        realizations(program_of(name, **faces), samples=60, seed=2)
         for faces in ({}, *({"faces": faces} for faces in (("-z", "+z"), ("-z", None), (None, "+z"))))
     )
     assert 10 < (whole.status == Status.RESOLVED).sum() < 60
@@ -59,7 +59,7 @@ def test_whole_bodies_touch_as_the_planes_between_them(name):
 @pytest.mark.parametrize("name", ["step", *nightly("lap")])
 def test_the_frame_of_whole_bodies_does_not_matter(name):
     programs = program_of(name), program_of(name, turn=(0.3, -0.5, 1.1))
-    runs = [tc.run(program, samples=30, surfaces=0, fields="none") for program in programs]
+    runs = [realizations(program, samples=30) for program in programs]
     assert np.array_equal(runs[0].status, runs[1].status)
     raw = [run.gap_min.sel(state="raw").values for run in runs]
     assert raw[0] == pytest.approx(raw[1], abs=1e-7)

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 import tolcontact as tc
-from tests.helpers import compiled
+from tests.helpers import compiled, realizations
 
 CORNERS = np.array([(5, 5), (45, 5), (45, 20), (5, 20), (25, 12.5)], dtype=float)
 
@@ -36,7 +36,7 @@ def test_a_model_moves_its_plane_as_the_points_say():
     assert list(measured.values) == ["block.top.offset", "block.top.tilt x", "block.top.tilt y"]
     assert np.abs(list(measured.uncertainties.values())).max() < 1e-12 and measured.freedoms.tolist() == [2] * 4
     model.population(measured.values)
-    run = tc.run(compiled(model), samples=60, seed=1).measured.sel(state="raw").values
+    run = realizations(compiled(model), samples=60, seed=1).measured.sel(state="raw").values
     nearest = np.abs(run[:, None] - heights).max(axis=2)
     assert nearest.min(axis=1).max() < 1e-4  # a small turn is not quite a displacement
     assert set(nearest.argmin(axis=1)) == set(range(4))

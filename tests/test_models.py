@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-import tolcontact as tc
 from tests import cases, referee
-from tests.helpers import ALL_POINTS, EXACT, PAPER, R_t, compiled, joined, nightly, simulate
+from tests.helpers import ALL_POINTS, EXACT, PAPER, R_t, compiled, joined, nightly, realizations, simulate
 from tolcontact.simulation import simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
@@ -187,7 +186,7 @@ def test_shafts_in_several_bores_rest_in_all_of_them(name, samples):
 @pytest.mark.slow
 def test_a_bracket_sags_by_the_clearances_of_its_bolts():
     """The lowest place of the weight at which both holes are within their clearances: a search over the shift along x."""
-    results = tc.run(compiled(cases.model("bracket"), solver="daqp"), samples=12, fields="none", surfaces=0)
+    results = realizations(compiled(cases.model("bracket"), solver="daqp"), samples=12)
     assert (results.status == Status.RESOLVED).all()
     drawn = results["sample"].deviation
 

@@ -1,5 +1,7 @@
 """Where an answer is looked for from other starts, and what that is good for."""
 
+import functools
+
 import numpy as np
 import pytest
 import trimesh
@@ -15,11 +17,9 @@ SEATED = tc.Method(objective="seating", resolution="exact")
 FIT = 0.05
 
 
-def peg(*size: tc.Size) -> tc.Assembly:
-    """A round peg, free to spin, that a force pushes to the side of a hole whose place varies; on few points.
-
-    size   of the hole, if it varies
-    """
+@functools.cache
+def run_of_peg():
+    """Of a round peg, free to spin, that a force pushes to the side of a hole whose place and size vary; on few points."""
     a = tc.Assembly("peg")
     plate = a.part("plate", tc.Mesh(trimesh.creation.annulus(5 + FIT, 20, 10, sections=180)), fixed=True)
     pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(5, 20, sections=180)), fixed=False)
@@ -30,17 +30,17 @@ def peg(*size: tc.Size) -> tc.Assembly:
     a.locate(pin, [*ends, *cases.parked("X:-5,0,0:x", "Y1:0,-5,0:y", "Y2:4,-3,0:y")])
     a.force("push", at=pin.point(0, 0, 0), vector=(1, -2, 0))
     wall = plate.face(lambda c, n: (abs(n[:, 2]) < 0.1) & (np.hypot(c[:, 0], c[:, 1]) < 10))
-    hole = plate.feature("hole", wall, *size) if size else wall
+    hole = plate.feature("hole", wall, tc.Size(10 + 2 * FIT, 2e-4, 0))
     a.contact("fit", moving=pin.face(lambda c, n: abs(n[:, 2]) < 0.1), reference=hole, points=200)
     a.measure("x", pin.point(0, 0, 0), along="x", tolerance=0.2)
-    return a
+    return simulate(a, samples=3, solver="daqp", method=SEATED)[1]
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_peg_that_rolled_into_the_wall_is_looked_for_again_with_points_projected_anew():
     """Along planes at fixed points it rolls into the wall. In the end it touches where the force points to."""
-    _, run = simulate(peg(), samples=3, solver="daqp", method=SEATED)
+    run = run_of_peg()
     assert (run["status"] == Status.RESOLVED).all()
     assert (run["starts"] >= 2).all() and (run["searched"] == 1).all()
     _, t = R_t(run["poses"][:, CORRECTED])
@@ -54,7 +54,7 @@ def test_a_peg_that_rolled_into_the_wall_is_looked_for_again_with_points_project
 @pytest.mark.filterwarnings("ignore")
 def test_points_that_are_projected_anew_stand_on_the_face_as_it_came_out():
     """The hole is larger by its size deviation: by half of it the peg goes farther, and touches."""
-    _, run = simulate(peg(tc.Size(10 + 2 * FIT, 2e-4, 0)), samples=3, solver="daqp", method=SEATED)
+    run = run_of_peg()
     assert (run["status"] == Status.RESOLVED).all() and (run["searched"] == 1).all()
     _, t = R_t(run["poses"][:, CORRECTED])
     apart = np.linalg.norm((t[:, 1] - t[:, 0])[:, :2], axis=1)

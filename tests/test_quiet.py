@@ -7,7 +7,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import SEATED, SEATED_ON_POINTS, compiled, nightly, run, script
+from tests.helpers import SEATED, SEATED_ON_POINTS, compiled, nightly, realizations, run, script
 from tolcontact.compilation import usable_solvers
 
 
@@ -23,7 +23,7 @@ from tolcontact.compilation import usable_solvers
 @pytest.mark.parametrize("case", ["block on six", *nightly("parked")])
 def test_solvers_print_nothing(solver, samples, method, case, capfd):
     a = {"block on six": lambda: cases.block_on_six(1.0), "parked": cases.shaft_in_a_v}[case]()
-    tc.run(compiled(a, solver=solver, method=method), samples=samples, seed=1, surfaces=0)
+    realizations(compiled(a, solver=solver, method=method), samples=samples, seed=1)
     assert capfd.readouterr() == ("", "")
 
 

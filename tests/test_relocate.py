@@ -80,7 +80,7 @@ def test_a_locator_at_the_best_place_stays_there(least, between):
 def test_with_contact_and_a_scheme_on_faces():
     """RA1: a 3-2-1 scheme becomes six locators, and nothing else changes."""
     a = cases.model("ra1")
-    found = tc.analyses.relocate(a, "base.A2", between=((50, 5, 0), (95, 5, 0)), least="corner height: 6 sigma", **QUICK)
+    found = tc.analyses.relocate(a, "base.A2", between=((50, 5, 0), (95, 5, 0)), least="corner height: 6 sigma", **FAST)
     program = compiled(a, solver="daqp")
     (block,) = tc.simulate_blocks(program, samples=2 * 4096, seed=1, start=4096, block=4096)
     estimate, lower, upper = found["reached"].sel(stage="before").values
@@ -102,7 +102,7 @@ def test_locators_of_a_scheme_stand_on_the_same_features():
     program = compiled(a, solver="daqp")
     own = program.nominal.parts[0].locators
     k = own.labels.index("plate.A3")
-    found = tc.analyses.relocate(a, "plate.A3", between=((40, 40, 0), (60, 45, 0)), least="height: 6 sigma", **QUICK)
+    found = tc.analyses.relocate(a, "plate.A3", between=((40, 40, 0), (60, 45, 0)), least="height: 6 sigma", **FAST)
     (block,) = tc.simulate_blocks(program, samples=4096 * 2, seed=1, start=4096, block=4096)
     assert float(found["reached"][0, 0]) == pytest.approx(6 * block.measured[:, 1, 0].std(ddof=1), rel=1e-6)
     assert own.faces[k] is not None

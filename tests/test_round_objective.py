@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
-from tests.helpers import compiled, nightly
+from tests.helpers import compiled, nightly, realizations
 
 BALL, FIXED = 5.0, 8.0  # radii, mm
 SIX = (("rx", (0, 40, 0), "z"), ("ry", (40, 0, 0), "z"), ("rz", (40, 0, 0), "y"))
@@ -29,7 +29,7 @@ def held(assembly, part, is_turned, size=1.0):
 
 def states(assembly):
     """Raw and corrected values (realization, measure) of realizations, all of which are resolved or untouched."""
-    results = tc.run(compiled(assembly, solver="daqp"), samples=200, seed=1, surfaces=0, fields="none")
+    results = realizations(compiled(assembly, solver="daqp"), samples=200)
     assert set(np.unique(results["status"])) <= {int(tc.Status.UNTOUCHED), int(tc.Status.RESOLVED)}
     return (results["measured"].sel(state=state).values for state in ("raw", "corrected"))
 
@@ -110,7 +110,7 @@ def test_a_plate_on_a_fixed_ball_moves_as_the_objective_says():
     ])  # fmt: skip
     a.contact("top", moving=plate.face("-z"), reference=ball.face())
     a.measure("height", plate.point(40, 40, 0), along="z")
-    results = tc.run(compiled(a, solver="daqp"), samples=40, seed=1, surfaces=0, fields="none")
+    results = realizations(compiled(a, solver="daqp"), samples=40, seed=1)
     poses = results["translation"].sel(part="plate"), results["rotation"].sel(part="plate")
     resolved = np.flatnonzero(results["status"] == tc.Status.RESOLVED)
     contact, corners = np.array([0, 0, BALL]), BALL * np.vstack([np.eye(3), -np.eye(3)])

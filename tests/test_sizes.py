@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.cases import STILL, Frame
-from tests.helpers import compiled, nightly
+from tests.helpers import compiled, nightly, realizations
 from tolcontact.testing import assert_gaps_recompute
 
 TURNED = Frame(turn=(0.5, -0.7, 1.1), shift=(100, -50, 7))
@@ -116,7 +116,7 @@ def test_both_faces_of_a_part_may_have_profiles():
         below = over
     a.measure("height", over.point(0, 5, 10), along="z")
     assert effects(a) == []
-    results = tc.run(compiled(a), samples=8, surfaces=0, fields="none", keep="all")
+    results = realizations(compiled(a), samples=8)
     labels = [f"s{k}.{face}.offset" for k in range(3) for face in ("under", "over")]
     heights = results["sample"].deviation.sel(contributor=labels).values.sum(axis=1)
     assert np.abs(results.measured.sel(state="raw", measure="height").values - heights).max() < ROUNDING
@@ -130,7 +130,7 @@ def test_measured_sizes_add_up(moves):
         w = part.feature("w", part.face("-z"), part.face("+z"), tc.Size(10, 0.05, moves=moves))
         a.measure(name, w.point(5, 5, 0), to=w.point(40, 5, 10), along="z", absolute=False)
     a.measure("sum", tc.Sum(*names))
-    results = tc.run(compiled(a), samples=8, surfaces=0, fields="none", keep="all")
+    results = realizations(compiled(a), samples=8)
     sizes = results["sample"].deviation.values.sum(axis=1)
     assert np.abs(results.measured.sel(state="raw", measure="sum").values - sizes).max() < ROUNDING
 
@@ -175,7 +175,7 @@ def on_a_round_face(inner, height, own=False):
     held += [tc.Locator("C", own_frame.apply((0, 5, 5)), own_frame.apply((1, 0, 0)))]
     a.locate(bar, held, tolerance=0, **({} if own else {"on": barrel}))
     a.measure("height", bar.point(*own_frame.apply((-20, 0, 5))), along="z")
-    results = tc.run(compiled(a), samples=8, surfaces=0, fields="none", keep="all")
+    results = realizations(compiled(a), samples=8)
     heights = results.measured.sel(state="raw", measure="height").values
     size = results["sample"].deviation.sel(contributor="round.barrel.size").values
     assert size.std() > 0.01

@@ -14,7 +14,7 @@ from rich.console import Console
 from scipy import stats
 
 import tolcontact as tc
-from tests.helpers import call, compiled
+from tests.helpers import call, compiled, realizations
 from tolcontact.report import analysis_text
 from tolcontact.vocabulary import STACK_UP
 
@@ -79,7 +79,7 @@ def test_a_dimension_is_shown_as_drawn_and_as_centred():
 
 
 def test_sensitivities_and_shared_links_have_the_moments_of_their_sums():
-    results = tc.run(compiled(brackets()), samples=20_000, seed=3)
+    results = realizations(compiled(brackets()), samples=20_000, seed=3)
     first, second = results.measured.sel(state="corrected").values.T
     left, right = 0.4 / 6, 0.4 / 1.33 / 6
     uniform, shift = 0.3 / math.sqrt(12), 0.2 * (1 - 1 / 1.33)
@@ -342,7 +342,7 @@ def test_a_stack_of_uniform_links_has_the_density_of_irwin_and_hall():
     for k in range(3):
         stack.link(f"disc {k}", 5, tc.Tolerance(1.0, "uniform"))
     stack.gap("height", limits=(None, 15.9))
-    results = tc.run(compiled(stack), samples=40_000, seed=5)
+    results = realizations(compiled(stack), samples=40_000, seed=5)
     share = float((results.measured.sel(state="corrected") > 15.9).mean())
     expected = (3 - 2.4) ** 3 / 6  # of the sum of three uniform numbers beyond 2.4
     assert stats.binomtest(round(share * 40_000), 40_000, expected).pvalue > 1e-4

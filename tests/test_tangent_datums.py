@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import linprog
 
 import tolcontact as tc
-from tests.helpers import assembly_of, compiled
+from tests.helpers import assembly_of, compiled, realizations
 from tests.population_referee import measured_back
 from tolcontact.features import FormField
 from tolcontact.testing import assert_datums_recompute, assert_same_run
@@ -141,7 +141,7 @@ def test_without_coefficients_datums_lie_where_those_of_flat_faces_do_to_the_las
 
 
 def test_least_squares_ignores_the_form_of_datums():
-    formed, flat = (tc.run(compiled(plate(form, "least squares")), samples=50, seed=2) for form in (tc.Form(), None))
+    formed, flat = (realizations(compiled(plate(form, "least squares")), samples=50, seed=2) for form in (tc.Form(), None))
     np.testing.assert_array_equal(formed.measured, flat.measured)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests.cases.frames import STILL, Frame
-from tests.helpers import compiled, nightly
+from tests.helpers import compiled, nightly, realizations
 
 SIZE, STIFFNESS = (60, 40, 10), 2000.0
 TURNED = Frame(tc.degrees(30, 20, 10), (3, -4, 5))
@@ -42,7 +42,7 @@ def test_springs_yield_by_the_force_of_each_realization(count, frame, solver):
     """Six bodies have functions of their own for each pair; the force is a constant for these."""
     a, point = pads(count, frame)
     a.force("press", at=point, vector=frame.along(0, 0, -100), tolerance=tc.Tolerance(120, "uniform"))
-    results = tc.run(compiled(a, solver=solver), samples=40, seed=1, keep="all")
+    results = realizations(compiled(a, solver=solver), samples=40, seed=1)
     force = 100 + results["sample"].deviation.sel(contributor="press").values
     assert np.ptp(force) > 60
     assert tops(results) == pytest.approx(-count * force / STIFFNESS, abs=1e-7)
@@ -54,7 +54,7 @@ def test_a_cause_loads_several_forces_in_its_own_units():
     for name, size in (("one", 100), ("two", 50)):
         a.force(name, at=point, vector=(0, 0, -size))
     a.variable("warmth", 30, units="K", loads={"one": -0.5, "two": -0.2})
-    results = tc.run(compiled(a), samples=20, keep="all")
+    results = realizations(compiled(a), samples=20)
     warmth = results["sample"].deviation.sel(contributor="warmth").values
     assert tops(results) == pytest.approx(-(150 - 0.7 * warmth) / STIFFNESS, abs=1e-9)
     assert "loads one by -0.5 N per K, two by -0.2 N per K" in str(a)
