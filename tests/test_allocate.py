@@ -13,7 +13,9 @@ from scipy.stats import norm
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER, call, compiled, nightly
+from tests.helpers import PAPER, call, nightly
+from tolcontact.discretization import discretize
+from tolcontact.variation import Draws
 
 
 def pile(*ranges, tolerance=1.0):
@@ -91,13 +93,13 @@ def located(part, scheme, labels, widths):
     side = "-y" if part.name == "base" else "+y"
     a.locate(own, tc.three_two_one(own.face("-z"), own.face(side), own.face("-x"), inset=5), tolerance=1)
     a.measure("m", own.point(0, 0, 0), along="x")
-    locators = compiled(a).nominal.locators
+    locators = discretize(a).locators
     for k, (label, width) in enumerate(zip(labels, widths, strict=True)):
         yield label, tuple(locators.points[k] - part.at), tuple(locators.directions[k]), float(width)
 
 
 def test_scaled_draws_are_draws_of_other_ranges():
-    one, other = (compiled(pile(*widths)).draws for widths in ((0.6, 0.3), (1.2, 0.15)))
+    one, other = (Draws(discretize(pile(*widths))) for widths in ((0.6, 0.3), (1.2, 0.15)))
     names = [each.label for each in one.contributors]
     scale = np.array([{"p0.Z": 2.0, "p1.Z": 0.5}.get(name, 1.0) for name in names])
     assert np.array_equal(one.scaled(scale)(seed=3, start=0, stop=50), other(seed=3, start=0, stop=50))

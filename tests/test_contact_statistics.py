@@ -5,7 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import compiled
+from tests.helpers import compiled, nightly
 from tests.test_report import data_of
 from tolcontact.report import write_page
 from tolcontact.statistics import touching
@@ -28,7 +28,7 @@ def test_figures_are_those_of_the_rows():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["lid", "door"])
+@pytest.mark.parametrize("name", ["door", *nightly("lid")])
 def test_points_touch_where_the_least_gap_is_closed(name):
     """A pair whose least gap is closed has a point that touches, and no other has."""
     results = tc.run(compiled(cases.MODELS / f"{name}.py", solver="daqp"), samples=40, seed=3, surfaces=0)

@@ -11,7 +11,7 @@ from tests.helpers import assembly_of, compiled
 from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
 from tolcontact.testing import assert_same_run
-from tolcontact.variation import draw
+from tolcontact.variation import Draws, draw
 
 CORNERS = np.array([(x, y, z) for x in (0.0, 60.0) for y in (0.0, 40.0) for z in (0.0, 20.0)])
 
@@ -46,7 +46,7 @@ def tangent_plane(corners):
 
 def outside_share(association, width=0.1):
     """The share of far faces outside of the zone that the tangent of the side places."""
-    nominal = compiled(plate(association), solver="daqp").nominal
+    nominal = discretize(plate(association))
     deviations = draw(nominal, seed=3, start=0, stop=1000)
     side, far = (moved_corners(nominal, deviations, name, (0, at)) for name, at in (("side", 0.0), ("far", 60.0)))
     outside = 0
@@ -66,16 +66,17 @@ def test_a_datum_by_least_squares_leaves_many_outside_of_that_zone():
 
 
 def test_the_shift_of_the_datum_follows_from_the_tilt_and_is_measured_back():
-    program = compiled(plate("outside", corner=(5.0, -3.0, 2.0)), solver="daqp")
-    labels = list(program.nominal.contributors)
-    deviations = program.draws(seed=5, start=0, stop=200)
+    nominal = discretize(plate("outside", corner=(5.0, -3.0, 2.0)))
+    draws = Draws(nominal)
+    labels = list(nominal.contributors)
+    deviations = draws(seed=5, start=0, stop=200)
     shift = deviations[:, labels.index("plate.far.datum B of A|B|C")]
     assert shift == pytest.approx(np.abs(deviations[:, labels.index("plate.side.tilt z")]))
     assert not [label for label in labels if "datum" in label and "far" not in label]  # others do not follow it
     for association in ("outside", "least squares"):
         inside = measured_back(plate(association), 2000).share
         assert float(inside[-1]) > 0.99
-    assert [tolerance for tolerance in program.draws.varying if "datum" in tolerance] == []
+    assert [tolerance for tolerance in draws.varying if "datum" in tolerance] == []
 
 
 def test_the_association_is_in_the_model_and_its_json(tmp_path):
@@ -126,7 +127,7 @@ def block_with_top(*tolerances):
 def test_the_lower_segment_of_a_composite_frame_limits_tilts_as_an_orientation_tolerance_does():
     lower = block_with_top(tc.Profile(0.5, "A|B|C"), tc.Profile(0.1, "A><"))
     oriented = block_with_top(tc.Profile(0.5, "A|B|C"), tc.Parallelism(0.1, "A"))
-    spreads = [[contributor.spread for contributor in compiled(model).draws.contributors] for model in (lower, oriented)]
+    spreads = [[contributor.spread for contributor in Draws(discretize(model)).contributors] for model in (lower, oriented)]
     assert spreads[0] == pytest.approx(spreads[1], rel=1e-9)
     zones = measured_back(lower, 20_000)
     assert (zones.lower < 0.9973).all() and (zones.upper > 0.9973).all()
@@ -144,10 +145,11 @@ def test_a_datum_that_locks_directions_alone_is_not_followed_to_its_place(system
     )
     hole = part.feature("hole", part.face(tc.select.Brep((19.05, 15.0, 1))), tc.Position(1e-6, system))
     model.measure("hole", hole.axis(1), along="y")
-    program = compiled(model)
-    hole, deviations = program.nominal.features[-1], program.draws(seed=1, start=0, stop=100)
+    nominal = discretize(model)
+    draws = Draws(nominal)
+    hole, deviations = nominal.features[-1], draws(seed=1, start=0, stop=100)
     coordinates = dict(zip(hole.geometry.names, hole.coordinates @ deviations[:, : hole.coordinates.shape[1]].T, strict=True))
-    tilt = deviations[:, program.nominal.contributors.index("cover.far.tilt z")]
+    tilt = deviations[:, nominal.contributors.index("cover.far.tilt z")]
     assert tilt.std() > 0.01
     assert coordinates["tilt x"] == pytest.approx(0 * tilt, abs=1e-5)  # the hole is square to A first
     assert (coordinates["shift y"].std() > 0.01) == follows

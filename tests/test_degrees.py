@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tolcontact as tc
-from tests.helpers import compiled
+from tolcontact.discretization import discretize
 
 
 def test_degrees_are_radians_in_the_form_of_arguments():
@@ -20,7 +20,7 @@ def test_a_part_turns_by_that_many_degrees():
     model = tc.Assembly("turned")
     model.part("block", tc.Box(30, 20, 10), rotation=tc.degrees(0, 0, 90), fixed=True)
     model.measure("x", model.parts[0].point(0, 0, 0), along="x")
-    body = compiled(model).nominal.parts[0].body
+    body = discretize(model).parts[0].body
     assert body.bounds == pytest.approx(np.array([[-20, 0, 0], [0, 30, 10]]), abs=1e-12)
 
 

@@ -114,7 +114,7 @@ def test_conflicts_of_a_beam_do_not_depend_on_its_place_and_are_recomputed(tmp_p
     assert overlaps[1] == pytest.approx(overlaps[0], abs=1e-5)
 
 
-@pytest.mark.parametrize("feet", [range(6), (2, 3, 4, 5)])
+@pytest.mark.parametrize("feet", [range(6), *nightly(((2, 3, 4, 5),))])
 def test_a_beam_that_nothing_holds_down_is_never_certified(tmp_path, feet):
     """Lifted off its feet, it is adrift."""
     _, run = simulate(beam(tmp_path, feet, press=100.0, one_sided=True), samples=8)

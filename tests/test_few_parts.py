@@ -10,7 +10,9 @@ from scipy import optimize, stats
 
 import tolcontact as tc
 from tests.helpers import compiled
+from tolcontact.discretization import discretize
 from tolcontact.report import summary_text
+from tolcontact.variation import Draws
 
 PARTS, MEAN, SD = 30, 0.01, 0.02
 OTHERS = {"Z2": (0, 0, 0), "Z3": (20, 0, 0), "Y1": (0, 0, 5), "Y2": (20, 0, 5), "X1": (0, 10, 5)}
@@ -151,7 +153,7 @@ def test_causes_are_no_parts():
 def test_parts_are_declared_kept_and_told():
     model = supplied(count=6)
     assert str(model.variables[0].tolerance) == "mean 0.01, standard deviation 0.02 mm of 30 parts"
-    (line,) = compiled(model).draws.in_words
+    (line,) = Draws(discretize(model)).in_words
     assert line.endswith("include: link 0, link 1, link 2, link 3 and 2 more from 30 parts")
     faults = {
         tc.Tolerance(distribution=stats.norm(0, 1), parts=4): "parts is 4; expected a whole number, 5 or more",

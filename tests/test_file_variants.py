@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 import tolcontact as tc
-from tests.helpers import ROOT, compiled
+from tests.helpers import ROOT
+from tolcontact.discretization import discretize
 
 COVER = ROOT / "models" / "cover.step"
 NAME = b"PRODUCT('COMPOUND','COMPOUND'"
@@ -48,7 +49,7 @@ def test_a_mirrored_node_is_a_body_with_its_normals_outward(angle, around, tmp_p
     a = tc.Assembly("door")
     part = a.part("left", tc.Mesh(tmp_path / "left.glb", units="mm"), fixed=True)
     a.measure("x", part.point(0, 0, 0), along="x")
-    body = compiled(a).nominal.parts[0].body
+    body = discretize(a).parts[0].body
     corners = trimesh.transform_points(wedge.vertices, outer @ mirror)
     assert body.volume == pytest.approx(wedge.volume, rel=1e-6)
     np.testing.assert_allclose(np.sort(body.vertices, axis=0), np.sort(corners, axis=0), atol=1e-5)

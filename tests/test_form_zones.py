@@ -7,15 +7,17 @@ from scipy.stats import beta
 import tolcontact as tc
 from tests.cases import toleranced
 from tests.cases.seats import seat
-from tests.helpers import compiled, nightly
+from tests.helpers import nightly
 from tests.population_referee import measured_back
+from tolcontact.discretization import discretize
+from tolcontact.variation import Draws
 
 FORMS = [tc.Form(), tc.Form(length=10), tc.Form("matern 5/2"), tc.Form("matern 3/2")]
 SHARE = 0.9973002039367398
 
 
 def field_of(form):
-    return compiled(seat(form)).nominal.features[0].form
+    return discretize(seat(form)).features[0].form
 
 
 def test_modes_displace_no_face_as_a_whole_and_leave_little_out():
@@ -38,16 +40,17 @@ def count_inside(needed, count):
 
 @pytest.mark.parametrize(("flatness", "spread"), [(0.1, 19.52), *nightly((0.05, 12.84))])
 def test_form_and_displacements_share_the_zone_around_them(flatness, spread):
-    program = compiled(toleranced.block_with("top", tc.Profile(0.2, "A|B|C"), tc.Flatness(flatness)))
-    own = {contributor.label: contributor.spread for contributor in program.draws.contributors}
+    nominal = discretize(toleranced.block_with("top", tc.Profile(0.2, "A|B|C"), tc.Flatness(flatness)))
+    draws = Draws(nominal)
+    own = {contributor.label: contributor.spread for contributor in draws.contributors}
     assert own["block.top.offset"] == own["block.top.tilt x"] == pytest.approx(0.2 / spread, rel=0.015)
-    (top,) = (feature for feature in program.nominal.features if feature.feature.name == "top")
+    (top,) = (feature for feature in nominal.features if feature.feature.name == "top")
     count, inside, modes = 200_000, 0, top.form.heights(top.form.places)
     x, y = (top.form.places - top.geometry.centre)[:, :2].T
-    labels = program.nominal.contributors
+    labels = nominal.contributors
     places = [labels.index(f"block.top.{name}") for name in ("offset", "tilt x", "tilt y")]
     for start in range(0, count, 4000):
-        drawn = program.draws(seed=5, start=start, stop=start + 4000)
+        drawn = draws(seed=5, start=start, stop=start + 4000)
         offset, tilt_x, tilt_y = drawn[:, places].T[..., None]
         heights = drawn[:, top.form_columns] @ modes.T + offset + tilt_x * y / 25 - tilt_y * x / 50
         inside += int((2 * np.abs(heights).max(axis=1) <= 0.2).sum())
@@ -72,8 +75,8 @@ def test_a_population_is_measured_with_its_form():
 
 def test_a_profile_without_datums_is_the_form_of_a_plane():
     spreads = [
-        [contributor.spread for contributor in compiled(toleranced.block_with("top", tolerance)).draws.contributors]
+        [contributor.spread for contributor in Draws(discretize(toleranced.block_with("top", tolerance))).contributors]
         for tolerance in (tc.Flatness(0.1), tc.Profile(0.1), tc.LineProfile(0.1))
     ]
     assert len(spreads[0]) == 20 and spreads[0] == spreads[1] == spreads[2]
-    assert not len(compiled(toleranced.block_with("top", tc.Profile(0.1, form=None))).draws.contributors)
+    assert not len(Draws(discretize(toleranced.block_with("top", tc.Profile(0.1, form=None)))).contributors)

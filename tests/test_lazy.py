@@ -11,6 +11,7 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import PAPER, compiled, nightly
+from tolcontact.discretization import discretize
 
 
 def rows_of(results, name):
@@ -95,7 +96,7 @@ def test_what_is_no_number_of_realizations():
 
 
 def test_deviations_of_unknown_or_repeated_contributors():
-    labels = list(compiled(cases.ra1()).nominal.contributors)
+    labels = list(discretize(cases.ra1()).contributors)
     for wrong in ([*labels[:-1], "nobody"], [*labels, labels[0]]):
         array = xr.DataArray(np.zeros((2, len(wrong))), {"contributor": wrong}, ("realization", "contributor"))
         with pytest.raises(tc.OptionError, match=r'deviations of "(nobody|base\.A1)" are missing, unknown, or given twice'):

@@ -6,11 +6,13 @@ import trimesh
 
 import tolcontact as tc
 from tests.cases.elastic import beam, saved, stiffness
-from tests.helpers import assembly_of, compiled, nightly, simulate
+from tests.helpers import assembly_of, nightly, simulate
 from tests.test_cad import COVER
 from tests.test_json_models import written
+from tolcontact.discretization import discretize
 from tolcontact.errors import ModelError
 from tolcontact.geometry import preview
+from tolcontact.variation import Draws
 
 TURN = (0.3, -0.2, 0.5)
 SEATED = tc.Method(objective="seating")
@@ -132,7 +134,7 @@ def twins(group, plane, folder):
     images = images if isinstance(images, tuple) else (images,)
     own.measure(model, "left", np.eye(3), *own.parts)
     own.measure(model, "right", np.diag([-1.0 if axis == plane else 1.0 for axis in "xyz"]), *images)
-    freedoms = {freedom.label: freedom for freedom in compiled(model).draws.contributors if freedom.source != "datum"}
+    freedoms = {freedom.label: freedom for freedom in Draws(discretize(model)).contributors if freedom.source != "datum"}
     left = [label for label in freedoms if label.startswith("left")]
     right = [label.replace("left", "right") for label in left]
     assert sorted([*left, *right]) == sorted(freedoms)

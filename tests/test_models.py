@@ -21,6 +21,7 @@ METHODS = {
     "ra2": PAPER,
     "tower": ALL_POINTS,
 }
+LARGE = ("cells", "cover", "tower")
 # Table 1: mean, 6 sigma, variance.
 RA2 = {RAW: (-0.0014, 12.5187, 4.3534), CORRECTED: (-0.0664, 5.8544, 0.9521)}
 
@@ -37,7 +38,7 @@ def run_of(program, samples):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*(name for name in METHODS if name != "cover"), *nightly("cover")])
+@pytest.mark.parametrize("name", [*(name for name in METHODS if name not in LARGE), *nightly(*LARGE)])
 def test_every_model_resolves_all_its_contacts(name):
     for search in (None, "fixed"):
         program = program_of(name, search)
@@ -168,7 +169,7 @@ def test_lids_at_maximum_material_fit():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "samples"), [("hinge", 12), ("spindle", 20)])
+@pytest.mark.parametrize(("name", "samples"), [("hinge", 12), *nightly(("spindle", 40))])
 def test_shafts_in_several_bores_rest_in_all_of_them(name, samples):
     model = cases.model(name)
     program, run = simulate(model, samples=samples, solver="daqp", method=model.method)

@@ -9,7 +9,7 @@ from scipy.stats import binom
 import tolcontact as tc
 from tests.cases import Frame
 from tests.cases.toleranced import HOLES, plate_with_holes
-from tests.helpers import assembly_of, compiled
+from tests.helpers import assembly_of, compiled, nightly
 from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
@@ -66,8 +66,7 @@ def test_the_lower_frame_gives_the_distance_and_the_upper_frame_the_place():
         assert (x[1] - x[0]).std() == pytest.approx(2 * 0.1 / 6, rel=0.02)
 
 
-@pytest.mark.parametrize("count", [2, 4])
-@pytest.mark.parametrize("datums", ["A", ""])
+@pytest.mark.parametrize(("count", "datums"), [(2, ""), (4, "A"), *nightly((2, "A"), (4, ""))])
 def test_of_the_members_99_73_percent_are_inside_the_zones_of_both_frames(count, datums):
     samples = 200_000 // count
     ends = axis_ends(plate(tc.Position(0.5, "A|B|C"), tc.Position(0.1, datums), count=count), samples)

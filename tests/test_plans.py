@@ -47,15 +47,15 @@ def test_a_run_by_a_plan_is_narrower_and_its_archive_says_so(name, ra1, plain, t
 @pytest.mark.slow
 def test_a_run_goes_on_until_an_interval_is_narrow_enough(ra1, tmp_path):
     options = {"samples": 300, "fields": "none", "surfaces": 4, "keep": "measures"}
-    results = tc.run(ra1, until="corner height: 6 sigma +-2 %", **options)
+    results = tc.run(ra1, until="corner height: 6 sigma +-4 %", **options)
     estimate, lower, upper = tc.summarize(results).statistic_value.sel(state="corrected", statistic="6 sigma").values[0]
-    assert (upper - lower) / 2 <= 0.02 * estimate
+    assert (upper - lower) / 2 <= 0.04 * estimate
     assert 300 < results.sizes["realization"] < 20_000
     whole = tc.run(ra1, **options | {"samples": results.sizes["realization"]})
     assert np.array_equal(whole.measured, results.measured)  # the same realizations as without stages
     enough = tc.run(ra1, until="corner height: mean ±1", out=tmp_path / "a.nc", **options)
     assert enough.sizes["realization"] == 300
-    of_plan = tc.run(ra1, until="corner height: 6 sigma +-2 %", plan=SOBOL, **options)
+    of_plan = tc.run(ra1, until="corner height: 6 sigma +-4 %", plan=SOBOL, **options)
     assert of_plan.sizes["realization"] <= results.sizes["realization"]
 
 

@@ -5,7 +5,8 @@ import pytest
 from scipy import stats
 
 from tests import cases
-from tests.helpers import compiled, simulate
+from tests.helpers import simulate
+from tolcontact.discretization import discretize
 from tolcontact.vocabulary import BLOCK_ROWS, CORRECTED, RAW
 
 SIGMA2 = (10 / 6) ** 2
@@ -64,7 +65,7 @@ def interval(values):
 @pytest.fixture(scope="module")
 def top():
     """The covariance (6, 6) of the top's displacement, its centre's and its rotation, and the lever of the corner about it."""
-    locators = compiled(cases.model("ra1")).nominal.parts[1].locators
+    locators = discretize(cases.model("ra1")).parts[1].locators
     centre = locators.points.mean(axis=0)
     inverse = np.linalg.inv(np.hstack([locators.directions, np.cross(locators.points - centre, locators.directions)]))
     return SIGMA2 * inverse @ inverse.T, np.array([100, 12.5, 20]) - centre

@@ -7,9 +7,9 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases
 from tests.cases import toleranced
-from tests.helpers import compiled
 from tests.test_contributions import of_clipped, of_normal
 from tests.test_ra1 import plane_weights
+from tolcontact.discretization import discretize
 
 SUPPORTS = ("A1", "A2", "A3")
 
@@ -73,7 +73,7 @@ def test_a_derivative_is_the_sum_over_what_is_driven_also_with_negative_weights(
     a.variable("warp", 0.2, drives=dict(zip((f"block.{support}" for support in SUPPORTS), weights, strict=True)))
     found = tc.analyses.sensitivities(a, samples=64, solver="daqp").sel(measure="height")
     supports = [f"block.{support}" for support in SUPPORTS]
-    points = compiled(a, solver="daqp").nominal.parts[1].locators.points
+    points = discretize(a).parts[1].locators.points
     expected = plane_weights(points[:3, :2], np.array([50, 25]))
     assert found["nominal"].sel(contributor=supports).values == pytest.approx(expected, abs=1e-9)
     assert float(found["nominal"].sel(contributor="warp")) == pytest.approx(expected @ weights, abs=1e-9)

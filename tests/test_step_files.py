@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import tolcontact as tc
-from tests.helpers import compiled, simulate
+from tests.helpers import simulate
 from tests.shapes import patch, refusal, shape
 from tests.step_files import Step, assembly, corners, step_block, step_of
+from tolcontact.discretization import discretize
 
 SEVERAL = {
     "solids apart": (
@@ -111,7 +112,7 @@ ONE = {
 def meshes(tmp_path_factory):
     """The mesh of each file, by the name of its part."""
     model = model_of({kind: content for kind, (content, _, _) in ONE.items()}, tmp_path_factory.mktemp("one"))
-    return {part.part.name: part.mesh for part in compiled(model).nominal.parts}
+    return {part.part.name: part.mesh for part in discretize(model).parts}
 
 
 @pytest.mark.slow

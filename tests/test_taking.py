@@ -80,17 +80,17 @@ def test_an_interrupted_run_says_how_far_it_is_has_its_fields_and_goes_on(tmp_pa
             raise KeyboardInterrupt
 
     paths = [tmp_path / "stopped.nc", tmp_path / "whole.nc", tmp_path / "short.nc"]
-    options = {"seed": 3, "fields": 6000, "surfaces": 0}
+    options = {"seed": 3, "fields": 5000, "surfaces": 0}
     program = compiled(cases.stack(), solver="daqp", method=PAPER)
     with pytest.raises(KeyboardInterrupt):
-        tc.run(program, samples=10_000, out=paths[0], progress=interrupt, **options)
+        tc.run(program, samples=6000, out=paths[0], progress=interrupt, **options)
     tc.run(program, samples=4096, out=paths[2], **options).close()
     found = tc.summarize(paths[0])
-    assert found.attrs["realizations"] == 4096 and found.attrs["samples"] == 10_000
+    assert found.attrs["realizations"] == 4096 and found.attrs["samples"] == 6000
     assert found["field_realizations"] == 4096
     assert found["field_extreme"].identical(tc.summarize(paths[2])["field_extreme"])
     tc.run(program, samples=1000, out=paths[0], resume=True, **options).close()
-    tc.run(program, samples=10_000, out=paths[1], **options).close()
+    tc.run(program, samples=6000, out=paths[1], **options).close()
     for group in (None, "sample", "field/middle"):
         one, other = (contents(path, group) for path in paths[:2])
         assert one.identical(other), group

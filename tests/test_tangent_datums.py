@@ -10,8 +10,10 @@ from scipy.optimize import linprog
 import tolcontact as tc
 from tests.helpers import assembly_of, compiled, realizations
 from tests.population_referee import measured_back
+from tolcontact.discretization import discretize
 from tolcontact.features import FormField
 from tolcontact.testing import assert_datums_recompute, assert_same_run
+from tolcontact.variation import Draws
 
 TIGHT = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
@@ -124,13 +126,14 @@ def test_simple_forms_are_touched_where_closed_forms_say(shape, out, inverted):
 
 
 def test_without_coefficients_datums_lie_where_those_of_flat_faces_do_to_the_last_bit(program):
-    flat = compiled(block(form=None))
-    formed, names = list(program.nominal.contributors), list(flat.nominal.contributors)
+    nominal = discretize(block(form=None))
+    draws = Draws(nominal)
+    formed, names = list(program.nominal.contributors), list(nominal.contributors)
     free = [label for label in names if "datum" not in label]
     values, expected = np.zeros((50, len(formed))), np.zeros((50, len(names)))
     expected[:, [names.index(label) for label in free]] = np.random.default_rng(0).normal(size=(50, len(free)))
     values[:, [formed.index(label) for label in free]] = expected[:, [names.index(label) for label in free]]
-    flat.draws.add_shifts(expected)
+    draws.add_shifts(expected)
     program.draws.add_shifts(values)
     shifts = [label for label in names if "datum" in label]
     assert shifts

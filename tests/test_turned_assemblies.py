@@ -132,8 +132,15 @@ def test_turned_faces_keep_their_points_and_weights(name, overhang):
         np.testing.assert_allclose(turned.weights, pair.weights, atol=1e-11)
 
 
-@pytest.mark.parametrize("resolution", ["exact", "linearized"])
-@pytest.mark.parametrize(("name", "overhang"), [("L", False), ("ring", True), *nightly(("rectangle", True), ("disc", False))])
+@pytest.mark.parametrize(
+    ("name", "overhang", "resolution"),
+    [
+        ("L", False, "exact"),
+        ("ring", True, "linearized"),
+        *nightly(*(("ring", True, "exact"), ("L", False, "linearized"))),
+        *nightly(*((*plate, way) for plate in (("rectangle", True), ("disc", False)) for way in ("exact", "linearized"))),
+    ],
+)
 def test_realizations_of_turned_assemblies_are_the_same(name, overhang, resolution):
     method = tc.Method(resolution=resolution)
     _, run = simulate(plates(name, overhang=overhang), samples=SAMPLES, solver="daqp", method=method)

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 import tolcontact as tc
-from tests.helpers import call
+from tests.helpers import call, nightly
 
 SCRIPT = """import tolcontact as tc, casadi as ca
 def assembly():
@@ -105,7 +105,7 @@ def test_sensitivities_leave_out_what_is_no_number_and_say_of_how_many_realizati
     assert "never: not a number in 100 % of the realizations" in text and "nan" not in text
 
 
-@pytest.mark.parametrize("value", ["casadi.sqrt(-1 - x**2)", "1 / (0 * x)"])
+@pytest.mark.parametrize("value", ["casadi.sqrt(-1 - x**2)", *nightly("1 / (0 * x)")])
 def test_a_measure_that_is_never_a_number_says_so_once(value, tmp_path):
     (script := tmp_path / "block.py").write_text(f"""import casadi, tolcontact as tc
 def assembly():

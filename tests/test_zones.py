@@ -8,7 +8,6 @@ from scipy.stats import binom, norm
 
 import tolcontact as tc
 from tests.cases import Frame, toleranced
-from tests.helpers import compiled
 from tests.population_referee import measured_back
 from tolcontact.discretization import discretize
 from tolcontact.features import Freedom
@@ -148,7 +147,7 @@ def test_a_mean_shift_has_a_side():
     assert tc.Size(10, 0.1, side="down", cp=1.33, cpk=1.0).tolerance.mean_shift == pytest.approx(-shift)
     for side, sign in (("up", 1), ("down", -1)):
         block = toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side=side))
-        means = [freedom.mean for freedom in compiled(block).draws.contributors if freedom.mean]
+        means = [freedom.mean for freedom in Draws(discretize(block)).contributors if freedom.mean]
         assert len(means) == 1 and means[0] * sign > 0
     assert "side is 'left'; expected up, down or either" in list(tc.Tolerance(0.2, cp=1, cpk=0.9, side="left").faults())
     assert any("side is given without cpk" in fault for fault in tc.Tolerance(0.2, side="up").faults())
@@ -186,7 +185,7 @@ def test_lots_on_either_side_widen_a_measure_and_stack_up_arithmetically():
 
 def test_the_side_of_a_feature_may_be_unknown():
     known, either = (
-        compiled(toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side=side))).draws.contributors
+        Draws(discretize(toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side=side)))).contributors
         for side in ("up", "either")
     )
     moved = [(one, other) for one, other in zip(known, either, strict=True) if one.mean]
@@ -194,7 +193,7 @@ def test_the_side_of_a_feature_may_be_unknown():
     for one, other in moved:
         assert other.lot_distance == pytest.approx(one.mean) and other.mean == 0
         assert other.variance == pytest.approx(one.spread**2 + one.mean**2)
-    words = compiled(toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side="either"))).draws.in_words
+    words = Draws(discretize(toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2, side="either")))).in_words
     assert words == ["means off centre by cpk: block.top.offset up or down"]
 
 
