@@ -12,7 +12,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER, compiled, joined, realizations, simulate
+from tests.helpers import PAPER, compiled, joined, simulate
 from tolcontact.errors import ArchiveError
 
 SEATED = {"resolution": "exact", "objective": "seating"}
@@ -171,7 +171,7 @@ def test_a_distribution_of_ones_own_is_named():
     block = a.part("block", tc.Box(10, 10, 10), fixed=True)
     a.locate(block, [tc.Locator("Z", (5, 5, 0), "z", stats.gamma(2, scale=0.1)), *cases.translating(0)[1:]])
     a.measure("height", block.point(0, 0, 10), along="z")
-    sample = realizations(compiled(a, solver="daqp"), samples=5)["sample"].to_dataset()
+    sample = tc.run(compiled(a, solver="daqp"), samples=5)["sample"].to_dataset()
     assert sample["distribution"].values.tolist()[0] == "gamma" and np.isnan(sample["tolerance_range"].values[0])
 
 
@@ -188,7 +188,7 @@ def test_means_of_contributors_are_those_of_their_distributions():
     block.feature("width", block.face("+x"), block.face("-x"), tc.Size(10, 0.2, -0.1, cp=1, cpk=0.5))
     a.variable("warmth", tc.Tolerance(distribution=stats.uniform(1, 4)), drives={"block.Z": 0.0}, units="K")
     a.measure("height", block.point(0, 0, 10), along="z")
-    sample = realizations(compiled(a, solver="daqp"), samples=20_000)["sample"].to_dataset()
+    sample = tc.run(compiled(a, solver="daqp"), samples=20_000, surfaces=0)["sample"].to_dataset()
     drawn, said = sample["deviation"], sample["mean_shift"]
     assert len({round(float(one), 9) for one in said}) >= 5
     assert (abs(drawn.mean("realization") - said) <= 4.5 * drawn.std("realization") / np.sqrt(20_000) + 1e-15).all()
