@@ -161,7 +161,7 @@ def test_tables_are_as_wide_as_the_terminal(archive):
 
 @pytest.mark.slow
 def test_on_a_terminal_a_bar_shows_how_far_a_run_is(tmp_path):
-    command = [*COMMAND, "run", MODELS / "ra1.py", "--samples", "9000", "--solver", "daqp", "--surfaces", "0"]
+    command = [*COMMAND, "run", MODELS / "ra1.py", "--samples", "20000", "--solver", "daqp", "--surfaces", "0"]
     screen, terminal = pytest.importorskip("pty", reason="a terminal of POSIX").openpty()
     process, shown = start(command, cwd=tmp_path, stderr=terminal), b""
     os.close(terminal)
@@ -170,7 +170,7 @@ def test_on_a_terminal_a_bar_shows_how_far_a_run_is(tmp_path):
             shown += text
     os.close(screen)
     done, quiet = finish(process), call(tmp_path, *command[len(COMMAND) :], "--quiet")
-    assert re.search(r"ra1 ━+ 9000/9000 [\d ]+ a second, 0 s left", re.sub("\x1b.*?[a-zA-Z]", "", shown.decode()))
+    assert re.search(r"ra1 ━+ 20000/20000 [\d ]+ a second, 0 s left", re.sub("\x1b.*?[a-zA-Z]", "", shown.decode()))
     assert quiet.stderr == "" and quiet.stdout == done.stdout
 
 

@@ -7,7 +7,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests.cases import stations as cases
-from tests.helpers import compiled, contents, realizations, run, script
+from tests.helpers import compiled, contents, run, script
 from tolcontact.archive import bytes_of_rows
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
@@ -75,7 +75,7 @@ def test_a_run_is_resumed(archive, program, tmp_path):
 
 def test_the_bytes_of_a_row_are_foreseen(program):
     for keep in ("measures", "poses", "all"):
-        results = realizations(program, samples=50)
+        results = tc.run(program, samples=50, keep=keep, surfaces=0)
         rows = [
             v for node in results.subtree for v in node.to_dataset(inherit=False).variables.values() if "realization" in v.dims
         ]
