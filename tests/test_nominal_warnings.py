@@ -16,7 +16,7 @@ from tolcontact.plausibility import KINDS
 MODELS = sorted((Path(__file__).parents[1] / "models").glob("[!c]*.py")) + [
     Path(__file__).parents[1] / "models" / f"{name}.py" for name in ("cells", "channel", "clutch", "cover")
 ]
-LARGE = ("bracket", "cells", "cover", "tower", "welded_sheets")
+LARGE = ("cover", "welded_sheets")
 FEET = [("A1", (2, 2, 0), "z"), ("A2", (48, 2, 0), "z"), ("A3", (25, 23, 0), "z")]
 SIDES = [("B1", (2, 0, 5), "y"), ("B2", (48, 0, 5), "y"), ("C1", (0, 12, 5), "x")]
 
