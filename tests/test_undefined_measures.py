@@ -123,6 +123,9 @@ def assembly():
     done = call(tmp_path, "run", script, "--samples", "200", "--solver", "daqp", "--quiet")
     assert "u: not a number in 100 % of the realizations, so it has no verdict" in done.stdout
     assert done.returncode == 1 and "warning" not in done.stderr
+    table = call(tmp_path, "stackup", script, "--samples", "200", "--solver", "daqp").stdout
+    assert "u [mm]: not a number as drawn" in table and "No linear figures: it is not a number in" in table
+    assert "nan" not in table and "kink" not in table
 
 
 @pytest.mark.parametrize(("limits", "code", "word"), [("limits=(-1, 1)", 1, "verdict"), ("units='mm'", 0, "statistics")])
