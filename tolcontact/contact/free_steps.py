@@ -94,7 +94,7 @@ class FreeSteps:
             if trials[-1] == MAX_HALVINGS or not rows.size:
                 break
             # Several shares of a few steps are tried at once, since this takes hardly longer than to try one of them.
-            count = min(4 * len(trials), max(MAX_TRIALS // len(rows), 1), MAX_HALVINGS - trials[-1])
+            count = min(4 * len(trials), max(MAX_TRIALS // len(rows), 1), MAX_HALVINGS - int(trials[-1]))
             trials = trials[-1] + 1 + np.arange(count)
             poses = self._halved(before.poses[rows], state.poses[rows], count)
             deviations = np.repeat(task.deviations[rows], count, axis=0)
