@@ -41,8 +41,11 @@ WITH_SHAPES, WITHOUT_SHAPES = "shapes", "others"
 
 def pytest_addoption(parser):
     parser.addoption("--nightly", action="store_true", help="run the tests marked nightly too")
-    steps, told = (WITH_SHAPES, WITHOUT_SHAPES), "run tests/units and modules that check the shapes of arrays, or all others"
-    parser.addoption("--step", choices=steps, help=told)
+    steps, help_text = (
+        (WITH_SHAPES, WITHOUT_SHAPES),
+        "run tests/units and modules that check the shapes of arrays, or all others",
+    )
+    parser.addoption("--step", choices=steps, help=help_text)
 
 
 def pytest_configure(config):

@@ -28,9 +28,7 @@ from tolcontact.system import files
 
 WRITTEN_BYTES = 1 << 24  # that the netCDF library writes together; each call takes as long as many realizations
 LONGEST_SUFFIX = f".checkpoint.{'0' * 8}.part"  # of the working files of a run
-
-
-UNREADABLE = OSError, EOFError, RuntimeError, ValueError, KeyError, zipfile.BadZipFile
+UNREADABLE = OSError, EOFError, RuntimeError, ValueError, KeyError, zipfile.BadZipFile  # what a damaged checkpoint raises
 
 
 class Checkpoint(NamedTuple):

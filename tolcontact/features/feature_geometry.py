@@ -87,7 +87,7 @@ class FeatureOfSize(FeatureGeometry):
         return np.zeros(3), -0.5 if self.is_inner else 0.5
 
     def middle(self, face: int) -> np.ndarray:
-        """Return the point (3,) about which a face tilts."""
+        """Return the point (3,) [mm] about which a face tilts."""
         return self.centre
 
 
@@ -133,7 +133,7 @@ class SlabFeature(PlaneFeature, FeatureOfSize):
         return self._outward(face) * moving[face] / sum(moving), 0.0
 
     def middle(self, face: int) -> np.ndarray:
-        """Return the point (3,) about which a face tilts: its own middle, or tilted faces would slide in their planes."""
+        """Return the foot (3,) of the centre on the plane of a face: tilted about another point, faces would slide in their planes."""
         return self.centre + self._outward(face) * self.size / 2
 
     def _outward(self, face: int) -> np.ndarray:

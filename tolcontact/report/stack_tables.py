@@ -38,19 +38,19 @@ def _table(dataset: xr.Dataset) -> Table:
         rows.append([name + factor, *(figures if math.isfinite(half) else ["-"] * 3)])
     for state, word in terms.WORD_OF_STATE.items():
         ends = dataset["simulated"].sel(state=state).values
-        half = (ends[1, 0] - ends[0, 0]) / 2
-        rows.append([f"99.73 %, {word}", *map(number, ends), f"{half:.4g}" if math.isfinite(half) else "-"])
+        spread = (ends[1, 0] - ends[0, 0]) / 2
+        rows.append([f"99.73 %, {word}", *map(number, ends), f"{spread:.4g}" if math.isfinite(spread) else "-"])
     if _is_without_contact(dataset):
         rows[-2:] = [["99.73 %", *rows[-1][1:]]]
     value = f"{drawn:.6g}" if math.isfinite(drawn) else "not a number"
     title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]: {value} as drawn"
     title += f", {centred:.6g} centred" if math.isfinite(centred) else ""
-    return Table(title, ["", *terms.EXTREME_WORDS, "±"], rows, list(_remarks(dataset, drawn, centred, halves["RSS"])))
+    return Table(title, ["", *terms.EXTREME_WORDS, "±"], rows, list(_remarks(dataset, centred, halves["RSS"])))
 
 
-def _remarks(dataset: xr.Dataset, drawn: float, centred: float, rss: float) -> Iterator[str]:
+def _remarks(dataset: xr.Dataset, centred: float, rss: float) -> Iterator[str]:
     """Yield by how much RSS misses the simulated range, and what has no figure."""
-    if not math.isfinite(drawn):
+    if not np.isfinite(dataset["drawn"]):
         yield "No linear figures: it is not a number in the assembly as drawn."
         return
     if not math.isfinite(centred):
