@@ -17,7 +17,7 @@ from tolcontact.vocabulary import Status
 AT_NIGHT = ("lap of two corners", "lap of a wider box", "low step", "two walls", "wall shorter than the box")
 
 
-# Doubtful realizations, by name and `reverses`: the objective of a strip of 0.3 mm falls until the body is turned by 17 degrees.
+# Doubtful realizations, by name and `reverses`: the objective of a strip of 0.3 mm falls until it is turned by 17 degrees.
 DOUBTFUL = {("lap below the range", True): 1}
 
 

@@ -133,7 +133,7 @@ class SlabFeature(PlaneFeature, FeatureOfSize):
         return self._outward(face) * moving[face] / sum(moving), 0.0
 
     def middle(self, face: int) -> np.ndarray:
-        """Return the foot (3,) of the centre on the plane of a face: tilted about another point, faces would slide in their planes."""
+        """Return the foot (3,) of the centre on the plane of a face: it would slide in its plane about others."""
         return self.centre + self._outward(face) * self.size / 2
 
     def _outward(self, face: int) -> np.ndarray:
