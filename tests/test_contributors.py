@@ -227,6 +227,7 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
         "one,two\nmm,mm\n1,2\n": 'line 2, column "one" is "mm"',
         "one\n0.1 mm\n": 'line 2, column "one" is "0.1 mm"',
         "one\ttwo\n1,250\t1\n": 'line 2, column "one" is "1,250"; .*; its comma may separate decimals or thousands',
+        "one;two\n1,5;1\n1.250;1\n": 'line 3, column "one" is "1.250"; .*its point may .* thousands: write 1,250 or 1250',
         "one\n1_000\n0x10\nnan\ninf\n1\n": 'line 2, .*"1_000".* line 3, .*"0x10".*line 4, .*"nan".*; and 1 more;',
         "one,one\n1,2\n": 'columns 1 and 2 are both named "one"; rename one of them',
         "one [um]\n1\n": r'column "one \[um\]" is in um; give units="um"',
@@ -244,6 +245,9 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
         (tmp_path / "p.csv").write_text(text, encoding="utf-8")
         with pytest.raises(ValueError, match=f'^population "p.csv".*{message}'):
             a.population(tmp_path / "p.csv", {"top.A1": "one"})
+    for text in ("one;two\n1.250;0\n", "one;two\n1.25;0,5\n"):  # points alone, and one that separates no thousands
+        (tmp_path / "p.csv").write_text(text, encoding="utf-8")
+        assert a.population(tmp_path / "p.csv", {"top.A1": "one"}).values.tolist() == [[1.25]]
     (tmp_path / "p.csv").write_text("shaft [in],heat [K]\n0.001,2\n-0.001,1\n", encoding="utf-8")
     motor = tc.Stack("motor", units="in")
     motor.link("shaft", 1.5, 0.002)

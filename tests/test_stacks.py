@@ -284,6 +284,7 @@ def test_measured_links_of_a_table_have_the_intervals_of_their_parts(tmp_path):
         ("name,nominal,tolerance\nA,one,0.1\n", 'row 2: nominal is "one"; expected a number'),
         ("name,nominal,tolerance\nA,1,0.1\n\nB,#DIV/0!,0.1\n", 'row 4: nominal is "#DIV/0!"; expected a number'),
         ("name;nominal;tolerance\nA;1,250;0.1\n", "its comma may separate decimals or thousands: write 1.250 or 1250"),
+        ("name;nominal;tolerance\nA;1.250;0.1\nB;2,5;1\n", "its point may separate decimals or thousands: write 1,250 or 1250"),
         ("name,nominal,tolerance\nA,1_0,0.1\n", 'row 2: nominal is "1_0"; expected a number'),
         ("name,nominal,tolerance\nA,1e16,0.1\n", 'row 2: nominal is "1e16"; expected a number up to 1e+15'),
         ("name,nominal,tolerance\nA,1,±1e16\n", 'row 2: tolerance is "±1e16"; expected numbers up to 1e+15'),

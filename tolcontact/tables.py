@@ -16,29 +16,35 @@ EMPTY = "it is empty"
 SEPARATORS = ";\t,"  # of columns, in the order in which they are looked for
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?(?:0?,[0-9]+|[0-9]+,(?:[0-9]{1,2}|[0-9]{4,}))(?:[eE][+-]?[0-9]+)?")  # others: thousands
-_AMBIGUOUS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
+_AMBIGUOUS = re.compile(r"[+-]?[1-9][0-9]{0,2}[,.][0-9]{3}")  # decimals or thousands
 _COMMENT = re.compile(r"\s*#(?:\s|$)")  # "#DIV/0!" is none
 
 
 class Table(NamedTuple):
-    """A heading, and rows with the numbers of their lines; a blank line is a row without cells."""
+    """A heading, and rows with the numbers of their lines; a blank line is a row without cells.
+
+    decimal_marks   "." and ",", or one of them: "," if other cells have decimal commas, so that a point may separate thousands
+    """
 
     heading: list[str]
     rows: list[tuple[int, list[str]]]
-    has_decimal_commas: bool
+    decimal_marks: str
 
 
-def number(cell: str, *, has_decimal_commas: bool = False) -> float:
+def number(cell: str, *, decimal_marks: str = ".") -> float:
     """Return the number of a cell. Raises ValueError for any other text, in words that follow the name of the cell."""
     text = cell.replace("\N{MINUS SIGN}", "-")
-    if has_decimal_commas and _DECIMAL_COMMA.fullmatch(text):
+    is_ambiguous = _AMBIGUOUS.fullmatch(text) and ("," in text or decimal_marks == ",")
+    if "," in decimal_marks and _DECIMAL_COMMA.fullmatch(text):
         text = text.replace(",", ".")
-    if _NUMBER.fullmatch(text) and abs(value := float(text)) <= MAX_NUMBER:
+    if _NUMBER.fullmatch(text) and abs(value := float(text)) <= MAX_NUMBER and not is_ambiguous:
         return value
     advice = "; write a decimal point" if re.fullmatch(r"[+-]?[0-9.]*,[0-9]+", text) else ""
-    if _AMBIGUOUS.fullmatch(text):
-        advice = f"; its comma may separate decimals or thousands: write {text.replace(',', '.')} or {text.replace(',', '')}"
-    expected = f"a number up to {MAX_NUMBER:g}" if _NUMBER.fullmatch(text) else "a number"
+    if is_ambiguous:
+        name, mark, other = ("comma", ",", ".") if "," in text else ("point", ".", ",")
+        either = f"{text.replace(mark, other)} or {text.replace(mark, '')}"
+        advice = f"; its {name} may separate decimals or thousands: write {either}"
+    expected = f"a number up to {MAX_NUMBER:g}" if _NUMBER.fullmatch(text) and not is_ambiguous else "a number"
     actual = f'"{clipped(cell, 40)}"' if cell else "empty"
     raise ValueError(f"is {actual}; expected {expected}{advice}")
 
@@ -87,7 +93,8 @@ def read_table(path: Path, names: Collection[str] = (), max_bytes: int = MAX_BYT
         raise ValueError(str(error)) from error
     while rows and not rows[-1][1]:
         rows.pop()
-    return Table(heading, rows, separator != ",")
+    has_commas = separator != "," and any(_DECIMAL_COMMA.fullmatch(cell) for _, cells in rows for cell in cells)
+    return Table(heading, rows, "," if has_commas else ".")
 
 
 def _records(lines: list[str], heading_index: int, separator: str) -> Iterator[tuple[int, list[str]]]:

@@ -137,7 +137,7 @@ def _of_file(
             if gaps != "refused" and is_gap[row, column]:
                 continue
             try:
-                values[row, column] = number(cells[index], has_decimal_commas=table.has_decimal_commas)
+                values[row, column] = number(cells[index], decimal_marks=table.decimal_marks)
             except ValueError as fault:
                 faults.append(f'line {line}, column "{shown(table.heading[index])}" {fault}')
     if faults:

@@ -88,7 +88,7 @@ class Stack(Assembly):
         parts that they are from. A column "gap NAME" has the sensitivities of a gap, which is declared without limits. Raises
         ModelError with all faults of the table.
         """
-        heading, rows, has_decimal_commas = _table(Path(path), self.name)
+        heading, rows, decimal_marks = _table(Path(path), self.name)
         faults, title = Faults(), shown(Path(path).name)
         faults.extend(f'table "{title}": {fault}' for fault in _heading_faults(heading))
         faults.refuse(self.name)
@@ -101,7 +101,7 @@ class Stack(Assembly):
             try:
                 if len(cells) > len(heading):
                     raise ValueError(f"it has {len(cells)} cells for {len(heading)} columns; write decimals with a point")
-                numbers = _numbers(row, has_decimal_commas)
+                numbers = _numbers(row, decimal_marks)
                 links.append(self.link(row["name"], *_zone(row, numbers), sensitivity=numbers.get("sensitivity", 1.0)))
                 for name, factors in gaps.items():
                     if (factor := numbers.get(GAP + name)) is not None:
@@ -134,7 +134,7 @@ def _workbook(path: Path) -> Table:
     pandas = importlib.import_module("pandas")
     sheet = pandas.read_excel(path, header=None, dtype=object)
     rows = [["" if pandas.isna(cell) else str(cell).strip() for cell in row] for row in sheet.itertuples(index=False)]
-    return Table(rows[0] if rows else [], list(enumerate(rows[1:], start=2)), has_decimal_commas=True)
+    return Table(rows[0] if rows else [], list(enumerate(rows[1:], start=2)), decimal_marks=".,")
 
 
 def _heading_faults(heading: Sequence[str]) -> Iterator[str]:
@@ -154,13 +154,13 @@ def _heading_faults(heading: Sequence[str]) -> Iterator[str]:
         yield 'expected either a column "tolerance", or two, "upper" and "lower"; or "mean" and "sd" of measured links'
 
 
-def _numbers(row: Mapping[str, str], has_decimal_commas: bool) -> dict[str, float]:
+def _numbers(row: Mapping[str, str], decimal_marks: str) -> dict[str, float]:
     """Return the numbers of a row by their columns. Raises ValueError, which names the column, for a cell that is no number."""
     numbers = {}
     for column, text in row.items():
         if text and (column in NUMBERS or column.startswith(GAP)):
             try:
-                numbers[column] = number(text, has_decimal_commas=has_decimal_commas)
+                numbers[column] = number(text, decimal_marks=decimal_marks)
             except ValueError as fault:
                 raise ValueError(f"{column} {fault}") from None
     return numbers

@@ -103,7 +103,7 @@ def _node_rows(path: Path) -> tuple[np.ndarray | None, np.ndarray]:
     cells = np.empty((len(lines), width))
     for row, (line, texts) in enumerate(lines):
         try:
-            cells[row] = [number(text, has_decimal_commas=table.has_decimal_commas) for text in texts]
+            cells[row] = [number(text, decimal_marks=table.decimal_marks) for text in texts]
         except ValueError as fault:
             raise ValueError(f"line {line}: an entry {fault}") from fault
     return (cells[:, 0].astype(int) if width == 4 else None), cells[:, -3:]
