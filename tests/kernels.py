@@ -1,5 +1,10 @@
-"""Compile the kernels that most tests call into the user's cache: processes that start together would all compile the same."""
+"""Compile the kernels that most tests call into the user's cache: processes that start together would all compile the same.
 
+Two processes do so in two thirds of the time, if one runs the assemblies `backwards`: each finds compiled what the other has
+compiled by then.
+"""
+
+import sys
 import tempfile
 import warnings
 from pathlib import Path
@@ -13,15 +18,15 @@ from tests.test_properties import SCENES
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    for declare, method in SCENES.values():
-        tc.run(declare(), method=method, solver="daqp", samples=4, surfaces=4)
     with tempfile.TemporaryDirectory() as folder:
-        for model, method, solver in (
-            (cases.stack(), EXACT, "qpoases"),
-            (cases.stack(), EXACT, "graph"),
-            (cases.tab(), EXACT, "daqp"),  # its realizations are rescued, in vain
-            (cases.hinged_ring(3), SEATED, "daqp"),
-            (seat(points=40), SEATED, "daqp"),
-            (welded_sheets(Path(folder)), None, "qpoases"),
-        ):
-            tc.run(compiled(model, method=method, solver=solver), samples=4, surfaces=4)
+        programs = [
+            *((declare, method, "daqp") for declare, method in SCENES.values()),
+            (cases.stack, EXACT, "qpoases"),
+            (cases.stack, EXACT, "graph"),
+            (cases.tab, EXACT, "daqp"),  # its realizations are rescued, in vain
+            (lambda: cases.hinged_ring(3), SEATED, "daqp"),
+            (lambda: seat(points=40), SEATED, "daqp"),
+            (lambda: welded_sheets(Path(folder)), None, "qpoases"),
+        ]
+        for declare, method, solver in reversed(programs) if "backwards" in sys.argv else programs:
+            tc.run(compiled(declare(), method=method, solver=solver), samples=4, surfaces=4)

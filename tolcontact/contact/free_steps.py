@@ -122,20 +122,21 @@ class FreeSteps:
         relative: Float[Array, "k trial pair 12"],
     ) -> Bool[Array, "k trial"]:
         """Return whether steps of some realizations, at the poses after some `halvings`, are too long (k, trial)."""
-        tried = np.repeat(rows, len(halvings))
-        share = np.tile(0.5**halvings, len(rows))
+        rows_tried = np.repeat(rows, len(halvings))
+        shares = np.tile(0.5**halvings, len(rows))
         poses, relative = (values.reshape(-1, *values.shape[2:]) for values in (poses, relative))
-        fails = limits.are_free[tried] & self._candidates.interfere(relative)
+        fails = limits.are_free[rows_tried] & self._candidates.interfere(relative)
         # Places show penetration after small motions of the bodies, unless only the complete test detects it.
-        shown = np.flatnonzero(~fails & (share > 0.5**MAX_HALVINGS))
-        shortened = replace(state.take(tried[shown]), poses=poses[shown], relative=relative[shown])
-        fails[shown] = self._energy(task.take(tried[shown]), shortened) > limits.objective[tried[shown]]
+        left = np.flatnonzero(~fails & (shares > 0.5**MAX_HALVINGS))
+        shortened = replace(state.take(rows_tried[left]), poses=poses[left], relative=relative[left])
+        fails[left] = self._energy(task.take(rows_tried[left]), shortened) > limits.objective[rows_tried[left]]
         # Places deeper than the motion of the bodies are on the far side of a body. They take longest to find.
-        shown = shown[~fails[shown]]
-        one, part = share[shown], tried[shown]
-        deepest = limits.depths[part] + one * limits.motions[part] + TOUCHING
-        depths = self._depths(task.deviations[part], relative[shown], deepest)
-        fails[shown] = depths > TOUCHING + limits.depths[part] * (1 - one) + SINK_SHARE * one * limits.sizes[part]
+        left = left[~fails[left]]
+        share, realization = shares[left], rows_tried[left]
+        deepest = limits.depths[realization] + share * limits.motions[realization] + TOUCHING
+        depths = self._depths(task.deviations[realization], relative[left], deepest)
+        allowed = limits.depths[realization] * (1 - share) + SINK_SHARE * share * limits.sizes[realization]
+        fails[left] = depths > TOUCHING + allowed
         return fails.reshape(len(rows), -1)
 
     def _halved(
