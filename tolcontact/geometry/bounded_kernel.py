@@ -68,11 +68,14 @@ def _is_near(feet, columns, depths, k, j, distance):  # type: ignore[no-untyped-
 
 @compiled
 def gather(points, labels, places, feet, normals, heights, P_m, P_r, n_r):  # type: ignore[no-untyped-def]
-    """Write P_m, P_r, n_r (n, slot, 3) of the places with labels `points` (n, slot); of the first place if there is none."""
+    """Write P_m, P_r, n_r (n, slot, 3) of the places with labels `points` (n, slot); of the first place if there is none.
+
+    Label -1 is none, though further columns may have it: how many there are depends on the other poses.
+    """
     for k in range(points.shape[0]):
         for s in range(points.shape[1]):
             column = 0
-            for p in range(labels.shape[1]):
+            for p in range(labels.shape[1] if points[k, s] >= 0 else 0):
                 if labels[k, p] == points[k, s]:
                     column = p
                     break
