@@ -112,7 +112,7 @@ def test_bodies_that_share_two_regions_part_at_the_deeper_one_or_along_a_given_d
     np.testing.assert_allclose([way.widths[0], *way.normals[0]], [0.3, 0, 0, 1], atol=1e-3)
     X = pose(shift=(-0.05, 0, 0))[None]
     for direction, width in {(0, 0, 1): 0.3, (1, 0, 0): 0.05}.items():
-        way = neighbours(hook, stepped).ways_out(X, np.array([direction], dtype=float))
+        way = neighbours(hook, stepped).ways_out(X, directions=np.array([direction], dtype=float))
         np.testing.assert_allclose([way.widths[0], *way.normals[0]], [width, *direction], atol=1e-3)
 
 

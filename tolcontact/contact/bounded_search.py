@@ -130,14 +130,14 @@ class BoundedSearch(FixedSearch):
         if deepest is not None:
             places = places.only(places.actual_gaps >= -deepest[:, None])
         if start.guarded and self.adds_guard and self.guard is not None:
-            places = _with_guard(places, self.guard, X_RM, labels)
+            places = _with_guard(places, self.guard, X_RM, deviations, labels)
         if start.parted and self.parting is not None:
             places = _with_parting(places, self.parting, X_RM, labels)
         return BoundedScan(meeting, places)
 
     @cached_property
     def guard(self) -> Guard | None:
-        """What detects bodies that interfere where no place shows it; None if they may interfere."""
+        """What detects bodies that interfere where no place shows it; None if they may interfere, or have no inside."""
         return Guard.of(self.program, self.index)
 
     @cached_property
@@ -174,7 +174,9 @@ def _kept(labels: np.ndarray, former: Scan | None, at_rest: np.ndarray | None) -
     return np.concatenate([kept, former.minima], axis=1) if isinstance(former, BoundedScan) else kept
 
 
-def _with_guard(places: Places, guard: Guard, X_RM: np.ndarray, former_labels: np.ndarray | None) -> Places:
+def _with_guard(
+    places: Places, guard: Guard, X_RM: np.ndarray, deviations: np.ndarray, former_labels: np.ndarray | None
+) -> Places:
     """Return places with one more where bodies interfere and no place shows it.
 
     If such a place was active before (`former_labels` (n, k)), it is found again: else bodies would interfere again at once.
@@ -183,7 +185,7 @@ def _with_guard(places: Places, guard: Guard, X_RM: np.ndarray, former_labels: n
     if former_labels is not None:
         labels = np.where(is_guard(former_labels), former_labels, -1).max(axis=1, initial=-1)
     rows = np.flatnonzero((labels >= 0) | (places.actual_gaps.min(axis=1, initial=np.inf) >= -PENETRATION))
-    return places.followed_by(guard.places(X_RM[rows], labels[rows]).among(len(X_RM), rows))
+    return places.followed_by(guard.places(X_RM[rows], labels[rows], deviations[rows]).among(len(X_RM), rows))
 
 
 def _with_parting(places: Places, parting: Parting, X_RM: np.ndarray, former_labels: np.ndarray | None) -> Places:

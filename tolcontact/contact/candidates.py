@@ -90,11 +90,13 @@ class Candidates:
             found |= scans[k].depth_between(relative[:, k]) > self._allowed_bulge
         return found
 
-    def interfere(self, relative: Float[Array, "realization pair 12"]) -> Bool[Array, " realization"]:
+    def interfere(
+        self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
+    ) -> Bool[Array, " realization"]:
         """Return whether bodies of a pair interfere (realization,), by a test that is independent of the list of places."""
         found = np.zeros(len(relative), dtype=bool)
         for k, guard in self.guards.items():
-            found |= guard.interferes(relative[:, k])
+            found |= guard.interferes(relative[:, k], deviations)
         return found
 
     def slants(self, state: State) -> Float[Array, " n"]:

@@ -106,7 +106,7 @@ class FreeSteps:
     def _limits_of(self, task: Task, before: State, state: State, size: Float[Array, " n"]) -> _StepLimits:
         """Return the limits of steps from `before` to `state`."""
         depths = self._depths(task.deviations, before.relative, np.full(len(task), self._candidates.free_depth))
-        is_free = ~self._candidates.interfere(before.relative)
+        is_free = ~self._candidates.interfere(before.relative, task.deviations)
         objective = self._energy(task, before) * (1 + GAIN_SHARE)
         objective[(depths > TOUCHING) | ~is_free] = np.inf
         return _StepLimits(is_free, objective, depths, self._limits.displacement(before.poses, state.poses), size)
@@ -125,7 +125,7 @@ class FreeSteps:
         rows_tried = np.repeat(rows, len(halvings))
         shares = np.tile(0.5**halvings, len(rows))
         poses, relative = (values.reshape(-1, *values.shape[2:]) for values in (poses, relative))
-        fails = limits.are_free[rows_tried] & self._candidates.interfere(relative)
+        fails = limits.are_free[rows_tried] & self._candidates.interfere(relative, task.deviations[rows_tried])
         # Places show penetration after small motions of the bodies, unless only the complete test detects it.
         left = np.flatnonzero(~fails & (shares > 0.5**MAX_HALVINGS))
         shortened = replace(state.take(rows_tried[left]), poses=poses[left], relative=relative[left])
@@ -156,10 +156,10 @@ class FreeSteps:
         for _ in range(MAX_LIFTS):
             is_free = True
             for k, guard in self._candidates.guards.items():
-                rows = np.flatnonzero(guard.interferes(relative[:, k]))
+                rows = np.flatnonzero(guard.interferes(relative[:, k], deviations))
                 if not rows.size:
                     continue
-                is_free, way, pair = False, guard.ways_out(relative[rows, k]), self._candidates.pairs[k].pair
+                is_free, way, pair = False, guard.ways_out(relative[rows, k], deviations[rows]), self._candidates.pairs[k].pair
                 assert pair.reference is not None
                 sides = self._group.position(pair.moving), self._group.position(pair.reference)
                 normals = np.einsum("nij,nj->ni", pose.rotation(poses[rows, sides[1]]), way.normals)

@@ -108,7 +108,7 @@ class ContactResolver:
         depth_between = np.stack([scan.depth_between(relative[:, k]) for k, scan in enumerate(scans)]).max(axis=0)
         moves = np.any(raw_gap < -PENETRATION, axis=1) | (depth_between > 0) | self._method.minimizes.presses
         unseen = np.flatnonzero(~moves)
-        moves[unseen] = self._candidates.interfere(relative[unseen])
+        moves[unseen] = self._candidates.interfere(relative[unseen], deviations[unseen])
         touched = np.flatnonzero(moves)
         task = Task(
             raw=poses[touched][:, self.parts],
@@ -153,7 +153,7 @@ class ContactResolver:
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
         state.doubtful[:] = self._limits.is_doubtful(task, state)
         certified = np.flatnonzero(state.certified)
-        state.doubtful[certified] = self._candidates.interfere(state.relative[certified])
+        state.doubtful[certified] = self._candidates.interfere(state.relative[certified], task.deviations[certified])
         state.doubtful[:] |= self._candidates.are_apart(state) & state.certified
         state.doubtful[:] |= self._candidates.bulge(task.scans, state.relative) & state.certified
         state.doubtful[:] |= self._limits.lie_in_form(task, state)
@@ -208,13 +208,13 @@ class ContactResolver:
         if which == "apart":
             is_tested = self._candidates.are_guarded and not self._method.minimizes.presses
             rows = np.flatnonzero((raw_gap < -self._candidates.free_depth).any(axis=1) & is_tested)
-            return rows[~interfere(task.relative[rows])]
+            return rows[~interfere(task.relative[rows], task.deviations[rows])]
         if which == "interfere":
             rows = np.flatnonzero(state.doubtful)
-            return rows[interfere(state.relative[rows])]
+            return rows[interfere(state.relative[rows], task.deviations[rows])]
         if which == "not separated":
             rows = np.flatnonzero(state.outcome >= Outcome.DOUBTFUL)
-            return rows[~state.solved[rows] | interfere(state.relative[rows])]
+            return rows[~state.solved[rows] | interfere(state.relative[rows], task.deviations[rows])]
         if which == "slanted":
             return np.flatnonzero(state.certified & (self._candidates.slants(state) > MIN_SLANT))
         is_uncertain = state.outcome >= (Outcome.DOUBTFUL if which == "no answer" else Outcome.IN_CONFLICT)

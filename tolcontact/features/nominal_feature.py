@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from tolcontact import poses as pose
 from tolcontact.declaration import Feature
 from tolcontact.errors import GeometryFault
 from tolcontact.features.associated_features import placed_twist
@@ -55,6 +57,14 @@ class FaceDeviation:
         for column, factor in zip(self.columns, self.height, strict=True):
             heights += factor * deviations[:, column]
         return heights
+
+    def poses(self, deviations: np.ndarray) -> np.ndarray:
+        """Return the poses (row, 12) that move the nominal to the actual face, for deviations (row, column)."""
+        motions = np.zeros((len(deviations), 6))
+        for column, motion in zip(self.columns, self.twist.T, strict=True):  # in a fixed order
+            motions += deviations[:, [column]] * motion
+        R = Rotation.from_rotvec(motions[:, 3:]).as_matrix()
+        return pose.pose(R, motions[:, :3] + self.centre - (R * self.centre).sum(axis=2))
 
     def outward(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Return the motion (point, k) of `points` (point, 3) of the face along `normals` (point, 3) per unit deviation."""

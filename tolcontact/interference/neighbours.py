@@ -142,8 +142,13 @@ class Neighbours:
             interferes[rows] = of_rows
         return interferes
 
-    def ways_out(self, X_BA: Float[Array, "n 12"], directions: Float[Array, "n 3"] | None = None) -> WayOut:
-        """Return how bodies without deviations separate at poses X_BA (n, 12) at which they interfere.
+    def ways_out(
+        self,
+        X_BA: Float[Array, "n 12"],
+        deviations: Float[Array, "n contributor"] | None = None,
+        directions: Float[Array, "n 3"] | None = None,
+    ) -> WayOut:
+        """Return how bodies separate at poses X_BA (n, 12) at which they interfere.
 
         directions   (n, 3), in the frame of B: where bodies interfere at several places, the place counts whose separation is
                      closest to these, or else the deepest one
@@ -151,7 +156,7 @@ class Neighbours:
         places, feet, normals = np.zeros((3, len(X_BA), 3))
         way = WayOut(places, feet, normals, np.zeros(len(X_BA)))
         given = np.zeros((len(X_BA), 3)) if directions is None else np.ascontiguousarray(directions)
-        parting_kernel.ways_out(*self._nominal, np.ascontiguousarray(X_BA), sum(self.insets), given, *way)
+        parting_kernel.ways_out(*self._sides(deviations), np.ascontiguousarray(X_BA), sum(self.insets), given, *way)
         return way
 
     def measured(self, X_BA: Float[Array, "n 12"], deviations: Float[Array, "n contributor"] | None = None) -> Interference:

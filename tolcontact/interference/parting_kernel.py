@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact.compiled import compiled, uncounted
 from tolcontact.geometry.vector_kernel import along, cross, dot, minus, move, move_back, row, scaled, turn
-from tolcontact.interference.kernel import LEAF, corners_of, crossing, misses, vertex
+from tolcontact.interference.kernel import LEAF, corners_of, crossing, deviate, misses, vertex
 
 MIN_SINE = 1e-3  # of the angle between edges that have a common normal
 MAX_POINTS = 512  # of the common region of two bodies
@@ -227,6 +227,8 @@ def ways_out(A, B, poses, inset, directions, places, feet, normals, widths):  # 
     edges = np.empty(MAX_CROSSING, dtype=np.int64), np.empty(MAX_CROSSING, dtype=np.int64)
     for k in range(poses.shape[0]):
         X, direction, best_score, widths[k] = poses[k], row(directions, k), -np.inf, 0.0
+        deviate(A, k)
+        deviate(B, k)
         count = _collect(B, A, X, False, region, _collect(A, B, X, True, region, 0))
         _join_parts(region, count)
         for part in range(count):
