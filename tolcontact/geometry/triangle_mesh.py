@@ -103,7 +103,7 @@ def subdivided(
     done, origins = list[np.ndarray](), list[np.ndarray]()
     for _ in range(MAX_ROUNDS + 1):
         components = (column[faces] for column in vertices.T[:3])
-        is_long = np.sqrt(sum((np.roll(corners, -1, axis=1) - corners) ** 2 for corners in components)) > max_edge
+        is_long = np.sqrt(sum((corners[:, [1, 2, 0]] - corners) ** 2 for corners in components)) > max_edge
         divides = is_long.any(axis=1)
         done.append(faces[~divides])
         origins.append(origin[~divides])
