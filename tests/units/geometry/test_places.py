@@ -12,7 +12,7 @@ from studies.certificates.placements import FAMILIES, scene
 from tests.helpers import nightly
 from tests.units.geometry.test_outlines import between, plate
 from tolcontact.geometry.meeting import MAX_POINTS
-from tolcontact.geometry.places import Look
+from tolcontact.geometry.places import Look, Places
 
 pytestmark = pytest.mark.filterwarnings("ignore::tolcontact.errors.NominalWarning")
 
@@ -78,3 +78,13 @@ def test_of_plates_with_holes(seed):
     X[::2, 9:11] *= 10
     assert assert_same_places(meeting, X) > 100
     assert assert_same_places(meeting, hinged_poses(rng, 600, 0.1)) > 500
+
+
+def test_an_empty_slot_holds_the_same_place_whatever_other_poses_have():
+    """Arrays of several poses are as wide as the pose with the most places needs."""
+    rng = np.random.default_rng(0)
+    alone = Places(np.array([[7, 9]]), np.zeros((1, 2)), *rng.normal(size=(3, 1, 2, 3)), np.zeros((1, 2)))
+    wider = alone.followed_by(Places.none(1, 3))
+    for found, expected in zip(wider.rows(np.array([[9, -1]])), alone.rows(np.array([[9, -1]])), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(alone.rows(np.array([[9, 7]]))[0][0], alone.P_m[0, ::-1])
