@@ -337,3 +337,26 @@ def test_groups_without_influence_keep_their_ranges_and_those_at_a_limit_are_nam
     assert any(line.startswith("aside.Z") and "no influence" in line for line in lines)
     assert any(line.startswith("p0.Z") and "largest allowed" in line for line in lines)
     assert "at 0.1 times or 3 times those before, none of 8 192 resolved realizations changed" in " ".join(printed.split())
+
+
+def in_a_slot():
+    """A block with 0.2 mm of play in all between two walls: it fits unless its side deviates by more (1.5 sigma)."""
+    a = tc.Assembly("slot")
+    walls = [a.part(name, tc.Box(20, 30, 20), at=(x, 0, 0), fixed=True) for name, x in (("left", -20), ("right", 50.2))]
+    block = a.part("block", tc.Box(50, 30, 10), at=(0.1, 0, 0.5))
+    block.feature("datum", block.face("-x"), datum="A")
+    block.feature("side", block.face("+x"), tc.Profile(0.8, "A", rule="translation"))
+    seats = [tc.Locator(f"A{k}", point, "z", 0) for k, point in enumerate([(5, 5, 0), (45, 5, 0), (25, 25, 0)])]
+    seats += [tc.Locator(f"B{x}", (x, 0, 5), "y", 0) for x in (5, 45)]
+    a.locate(block, [*seats, tc.Locator("C", (0, 15, 5), "x", 0.6)])
+    for wall, side, other in zip(walls, ("-x", "+x"), ("+x", "-x"), strict=True):
+        a.contact(wall.name, moving=block.face(side), reference=wall.face(other), points=4)
+    a.measure("x", block.point(0, 15, 5), along="x", limits=(-0.3, 0.3))
+    return a
+
+
+def test_realizations_that_cannot_be_assembled_count_as_outside_limits():
+    """The pose of least penetration lies within the limits."""
+    found = tc.analyses.allocate(in_a_slot(), "x: ppm 200000", costs={"block.C": 1.0}, samples=256, solver="daqp")
+    for _, lower, upper in found.kept.values[0]:
+        assert lower < norm.sf(1.5) < upper

@@ -13,16 +13,8 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Answer, Progress, owners
 from tolcontact.analyses.costs import MAX_FACTOR, MIN_FACTOR, Cost, Curve, cheapest, constant, curves_of
-from tolcontact.analyses.scaled_trials import (
-    MIN_DECISIVE,
-    STEP,
-    Requirement,
-    ScaledTrials,
-    Trial,
-    effect_samples,
-    narrowing_effects,
-    requirements_of,
-)
+from tolcontact.analyses.requirements import MIN_DECISIVE, Requirement, requirements_of
+from tolcontact.analyses.scaled_trials import STEP, ScaledTrials, Trial, effect_samples, narrowing_effects
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.method import Solver
@@ -50,8 +42,8 @@ def allocate(
         range        (group, stage)                      full width of the zones, "before" and "after"; NaN if they differ
         factor       (group)                             range after over range before, the same for all zones of the group
         cost         (group, stage)
-        kept         (requirement, stage, interval)      the share outside the limits, or the Ppk, in a fresh run of
-                                                         4 samples realizations, with its 95 % interval
+        kept         (requirement, stage, interval)      the share outside the limits or not assemblable, or the Ppk, in a fresh
+                                                         run of 4 samples realizations, with its 95 % interval
         required     (requirement)                       the required share or Ppk
         met          (requirement)                       1: the whole interval of the fresh run after keeps the requirement;
                                                          0: no tolerances that were tried have such an interval, and `kept` is
@@ -319,8 +311,7 @@ class Search:
         rows, groups = rows[trial.is_resolved[rows]], np.flatnonzero(self.is_free)
         of_signs = [self.trials.changes(trial, groups, rows, trial.logs + step) for step in (STEP, -STEP)]
         for group, (wider, wider_values), (narrower, narrower_values) in zip(groups, *of_signs, strict=True):
-            wide, narrow = corrected.copy(), corrected.copy()
-            wide[wider], narrow[narrower] = wider_values, narrower_values
+            wide, narrow = corrected.replaced(wider, wider_values), corrected.replaced(narrower, narrower_values)
             margins = [[requirement.smooth_margin(x) for requirement in self.trials.requirements] for x in (wide, narrow)]
             slopes[:, group] = np.subtract(*np.array(margins)) / (2 * STEP)
         return slopes

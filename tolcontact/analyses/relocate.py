@@ -1,6 +1,6 @@
 """The position of a locator, within a box, that minimizes the variation of a measure, with contact."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,11 @@ from tolcontact.discretization import Nominal, NominalPart, discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.limits import Limits
 from tolcontact.method import Solver
+from tolcontact.realizations import is_assembled
 from tolcontact.statistics import intervals
 from tolcontact.statistics.capability import share_outside
-from tolcontact.statistics.intervals import Estimate
-from tolcontact.statistics.measure_statistics import StatisticRequest
+from tolcontact.statistics.intervals import UNDEFINED, Estimate
+from tolcontact.statistics.measure_statistics import MIN_VALUES, StatisticRequest
 from tolcontact.statistics.sample import Sample
 from tolcontact.workflow.models import DEFAULT_SOLVER, Choice, Model
 
@@ -47,7 +48,8 @@ def relocate(
     The locator stays where it is, with equal points before and after, if no trial is better, or if the fresh run does not
     confirm the best one.
 
-    `least` is "corner height: 6 sigma", or "corner height: ppm" (the share outside its limits). A coordinate that is the same
+    `least` is "corner height: 6 sigma", or "corner height: ppm" (the share outside its limits). Realizations that cannot be
+    assembled count as outside, and 6 sigma leaves them out, as in summaries. A coordinate that is the same
     in both corners does not change. The locator keeps its direction, so choose corners on the surface that it contacts. All
     trials use the same draws: first a grid and the present position, then scipy's COBYQA starting at the best of them. The
     statistic may have several minima, or be flat: see `tried_value`. Each trial compiles a model. `progress` is called with the
@@ -66,14 +68,14 @@ def relocate(
     trials = TrialPositions(analysis, locator, measure, limits, _corners(between))
     trials.search()
     best = trials.best
-    (before, lost_before), (after, lost_after) = (trials.measured(point, fresh=True) for point in (trials.point, best))
-    if not _estimate(after, limits).value < _estimate(before, limits).value:
-        best, after, lost_after = trials.point, before, lost_before
+    before, after = (trials.measured(point, fresh=True) for point in (trials.point, best))
+    if not after.estimate(limits).value < before.estimate(limits).value:
+        best, after = trials.point, before
     values = {
         "point": [trials.point, best],
-        "reached": [_estimate(before, limits), _estimate(after, limits)],
+        "reached": [before.estimate(limits), after.estimate(limits)],
         "change": _change(before, after, limits),
-        "unresolved": [lost_before, lost_after],
+        "unresolved": [before.unresolved, after.unresolved],
         "tried": trials.points,
         "tried_value": trials.values,
     }
@@ -97,18 +99,47 @@ def _goal(least: str, program: Program) -> tuple[int, Limits | None, str]:
     return measure, limits, "1"
 
 
-def _estimate(x: np.ndarray, limits: Limits | None) -> Estimate:
-    """Return the share of values (n,) outside limits, or 6 sigma without limits, with its interval."""
-    return intervals.standard_deviation(x, times=6) if limits is None else share_outside(Sample.of(x), limits)
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A corrected measure of realizations.
+
+    x       (n,)
+    status  (n,)
+    """
+
+    x: np.ndarray
+    status: np.ndarray
+
+    @property
+    def is_assembled(self) -> np.ndarray:
+        """Whether each realization can be assembled, (n,)."""
+        return is_assembled(self.status)
+
+    @property
+    def unresolved(self) -> int:
+        """The number of unresolved realizations."""
+        return int(np.isin(self.status, terms.UNRESOLVED).sum())
+
+    def estimate(self, limits: Limits | None) -> Estimate:
+        """Return the share outside limits or not assemblable, or 6 sigma without limits, with its interval."""
+        existing = self.x[self.is_assembled]
+        if limits is not None:
+            return share_outside(Sample.of(existing), limits, len(self.x) - len(existing))
+        return intervals.standard_deviation(existing, times=6) if len(existing) >= MIN_VALUES else UNDEFINED
 
 
-def _change(before: np.ndarray, after: np.ndarray, limits: Limits | None) -> Estimate:
-    """Return the change from values (n,) to values of the same draws: a ratio of 6 sigma, or a difference of shares."""
+def _change(before: Measured, after: Measured, limits: Limits | None) -> Estimate:
+    """Return the change between realizations of the same draws: a ratio of 6 sigma, or a difference of shares."""
     if after is before:
         return Estimate(*[float(limits is None)] * 3)
     if limits is None:
-        return Estimate(*np.sqrt(intervals.variance_ratio(after, before)))
-    hits = [Sample.of(limits.outside(x)) for x in (after, before)]
+        both = before.is_assembled & after.is_assembled
+        return (
+            Estimate(*np.sqrt(intervals.variance_ratio(after.x[both], before.x[both])))
+            if both.sum() >= MIN_VALUES
+            else UNDEFINED
+        )
+    hits = [Sample.of(limits.outside(measured.x) | ~measured.is_assembled) for measured in (after, before)]
     return intervals.share_shift(*hits, paired=True)
 
 
@@ -150,8 +181,8 @@ class TrialPositions:
         """The best position so far, (3,) [mm]."""
         return self.points[int(np.nanargmin(self.values))]
 
-    def measured(self, point: np.ndarray, *, fresh: bool = False) -> tuple[np.ndarray, int]:
-        """Return the corrected measure (n,) with the locator at a point (3,) [mm], and the number of unresolved realizations.
+    def measured(self, point: np.ndarray, *, fresh: bool = False) -> Measured:
+        """Return the corrected measure with the locator at a point (3,) [mm].
 
         A `fresh` run has other draws, and more of them.
         """
@@ -167,7 +198,7 @@ class TrialPositions:
         measured, status = analysis.of(compile_program(nominal, solver, method)).simulate(
             start or analysis.samples, start=start
         )
-        return measured[:, terms.CORRECTED, self._measure].copy(), int(np.isin(status, terms.UNRESOLVED).sum())
+        return Measured(measured[:, terms.CORRECTED, self._measure].copy(), status)
 
     def search(self) -> None:
         """Try a grid of positions and the declared one, and then further ones, starting at the best one."""
@@ -195,8 +226,7 @@ class TrialPositions:
     def _attempt(self, point: np.ndarray) -> float:
         """Return the value of the goal at a position (3,) [mm], also outside the box; infinite if there is no model."""
         try:
-            measured, _ = self.measured(point)
-            value = _estimate(measured, self._limits).value
+            value = self.measured(point).estimate(self._limits).value
         except ModelError:
             value = np.inf
         self.points.append(point)

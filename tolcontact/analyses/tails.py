@@ -48,7 +48,8 @@ def tails(
     interval is at most 1.5 times the lower one; otherwise the result comes from the other three quarters. A probability of 0
     with an upper bound means that the search ended below 1e-9. Where two searches disagree, the interval covers both results,
     and more realizations are needed. A measure that is not a number in any realization has the probability NaN, as in `run`.
-    Probabilities include unresolved realizations, with their last poses.
+    Probabilities include unresolved realizations, with their last poses: the event "outside limits" counts a realization that
+    cannot be assembled only if the measure is outside in its pose of least penetration.
     `progress` is called with the number of realizations simulated, and the approximate total. `model`, `samples`, `seed`,
     `solver`, `method`, `into`, `client` and `minutes` are as in all analyses (see tolcontact.analyses).
     Raises OptionError for a model that has no rare event.
