@@ -13,6 +13,7 @@ from scipy.stats import norm
 
 import tolcontact as tc
 from tests import cases
+from tests.cases import toleranced
 from tests.helpers import PAPER, call, nightly
 from tolcontact.discretization import discretize
 from tolcontact.variation import Draws
@@ -103,6 +104,24 @@ def test_scaled_draws_are_draws_of_other_ranges():
     names = [each.label for each in one.contributors]
     scale = np.array([{"p0.Z": 2.0, "p1.Z": 0.5}.get(name, 1.0) for name in names])
     assert np.array_equal(one.scaled(scale)(seed=3, start=0, stop=50), other(seed=3, start=0, stop=50))
+
+
+@pytest.mark.parametrize(
+    "bore",
+    [
+        lambda size, zone: (tc.Size(10, *size), tc.Position(zone, "A|B", material="M")),
+        lambda size, zone: (tc.Size(10, *size), tc.Position(zone, "A|B", material="L")),
+        lambda size, zone: (tc.Size(10, *size, envelope=True), tc.Cylindricity(zone, form=tc.Form(modes=3))),
+    ],
+)
+def test_scaled_sizes_take_their_material_limits_with_them(bore):
+    """A bonus, and the envelope, count from the limits of the scaled size: 0.1/0 becomes 0.2/-0.1 about its middle."""
+    declared, redrawn = (
+        Draws(discretize(toleranced.ring_with("bore", *bore(*limits)))) for limits in (((0.1, 0), 0.1), ((0.2, -0.1), 0.15))
+    )
+    scale = np.array([3.0 if label == "ring.bore.size" else 1.5 for label in declared.labels])
+    expected = redrawn(seed=3, start=0, stop=50)
+    assert declared.scaled(scale)(seed=3, start=0, stop=50) == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 def test_the_bound_of_a_fresh_run_keeps_what_is_required_and_costs_little_more_than_it_must():

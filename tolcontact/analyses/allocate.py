@@ -58,14 +58,16 @@ def allocate(
     costs keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`:
     "contributor", "feature" or "part".
 
-    Ranges without a table stay between a tenth and three times the present ones. Groups keep their ranges, or the next
-    narrower choice, if no required measure changes in any resolved realization with all of them at either end. Each step
-    replaces margins by functions of squared ranges with their values and slopes, on the same draws. SLSQP minimizes the cost
-    within a trust region (a sequential separable approximation; Svanberg, 1987). A step fails if more realizations are then
-    not assemblable than may be outside. Choices come from a linear program with binary unknowns on such functions. If a fresh
-    run does not keep a requirement, the margin of the search grows. `progress` is called with numbers of realizations. Raises
-    OptionError if no range varies. By default there are 8192 `samples`; `model`, `seed`, `solver`, `method`, `into`,
-    `client` and `minutes` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm 1000", by="part")`.
+    A zone is widened about its middle, and the limits of a size move with it: the bonus of a position at maximum material
+    counts from the limit of the widened size. Ranges without a table stay between a tenth and three times the present ones.
+    Groups keep their ranges, or the next narrower choice, if no required measure changes in any resolved realization with all
+    of them at either end. Each step replaces margins by functions of squared ranges with their values and slopes, on the same
+    draws. SLSQP minimizes the cost within a trust region (a sequential separable approximation; Svanberg, 1987). A step fails
+    if more realizations are then not assemblable than may be outside. Choices come from a linear program with binary unknowns
+    on such functions. If a fresh run does not keep a requirement, the margin of the search grows. `progress` is called with
+    numbers of realizations. Raises OptionError if no range varies. By default there are 8192 `samples`; `model`, `seed`,
+    `solver`, `method`, `into`, `client` and `minutes` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm
+    1000", by="part")`.
     """
     analysis = Analysis(
         terms.ALLOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,

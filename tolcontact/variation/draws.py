@@ -23,7 +23,7 @@ from tolcontact.errors import ModelError
 from tolcontact.features.datum_frames import Shifts
 from tolcontact.features.freedoms import Freedom
 from tolcontact.variation.plans import STREAM, Numbers, planned_numbers
-from tolcontact.variation.spreads import ComponentZone, Envelope, envelopes, fill_zones
+from tolcontact.variation.spreads import ComponentZone, Envelope, Widening, envelopes, fill_zones
 from tolcontact.vocabulary import MONTE_CARLO
 
 MAX_SCORE, SCORES, TERMS = 8.0, 8001, 80
@@ -162,7 +162,10 @@ class Draws:
         return draws
 
     def scaled(self, factors: np.ndarray) -> "Draws":
-        """Return draws of the same numbers with zones widened by factors (contributor,), each about its middle."""
+        """Return draws of the same numbers with zones widened by factors (contributor,), each about its middle.
+
+        The limits of sizes move with their zones: a bonus and an envelope count from the limits of the widened size.
+        """
         draws = copy.copy(self)
         draws._scale = factors
         return draws
@@ -222,10 +225,13 @@ class Draws:
         """Add shared causes to sizes, scale components by the bonus of their sizes, and add shared causes to the rest."""
         measured = [column for columns, _ in self.populations for column in columns]
         sizes = {int(size) for zone in self._scaling for size in zone.sizes}
+        factors = self._scale.copy()
+        factors[measured] = 1.0
+        widening = Widening(factors, self._middle)
         self._add_causes(deviations, lambda column: column in sizes)
         for zone in self._scaling:
-            columns = np.setdiff1d(zone.scaled, measured)  # measured parts have used their bonus
-            deviations[:, columns] *= zone.scale(deviations)[:, None]
+            is_drawn = ~np.isin(zone.scaled, measured)  # measured parts have used their bonus
+            deviations[:, zone.scaled[is_drawn]] *= zone.scale(deviations, widening)[:, is_drawn]
         self._add_causes(deviations, lambda column: column not in sizes)
 
     @property

@@ -88,6 +88,18 @@ def _unit_widths(zone: tuple[tuple[bytes, bytes], ...], heights: bytes, modes: i
 
 
 @dataclass(frozen=True, eq=False)
+class Widening:
+    """Factors (contributor,) of the widths of zones, each about its `middle` (contributor,) in the units of the contributor."""
+
+    factors: np.ndarray
+    middle: np.ndarray
+
+    def limits(self, limit: float, columns: np.ndarray) -> np.ndarray:
+        """Return a limit deviation [mm] of sizes after their zones are widened, by their columns (size,)."""
+        return np.asarray(limit + (self.factors[columns] - 1.0) * (limit - self.middle[columns]))
+
+
+@dataclass(frozen=True, eq=False)
 class ComponentZone:
     """The zone of the components of a feature, or of members of a pattern that have components in common.
 
@@ -113,11 +125,14 @@ class ComponentZone:
     limit: float = 0.0
     growth: float = 0.0
 
-    def scale(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the factor (n,) of the scaled components for the bonus of deviations (n, contributor)."""
-        sizes = deviations[:, np.unique(self.sizes)]
-        bonus = np.maximum(self.growth * (sizes - self.limit), 0.0)
-        return np.asarray((self.width + bonus.min(axis=1)) / self.drawn_width)
+    def scale(self, deviations: np.ndarray, widening: "Widening") -> np.ndarray:
+        """Return the factors (n, scaled) of the scaled components for the bonus of deviations (n, contributor).
+
+        The deviations are those of widened zones: the bonus counts from the limit of the widened size, and is not widened.
+        """
+        sizes, factors = np.unique(self.sizes), widening.factors[self.scaled]
+        bonus = np.maximum(self.growth * (deviations[:, sizes] - widening.limits(self.limit, sizes)), 0.0)
+        return np.asarray((factors * self.width + bonus.min(axis=1)[:, None]) / (factors * self.drawn_width))
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,15 +154,16 @@ class Envelope:
     limit: float
     growth: float
 
-    def scale(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the factor (n,), 0 to 1, of the form for deviations (n, contributor)."""
+    def scale(self, deviations: np.ndarray, widening: Widening) -> np.ndarray:
+        """Return the factors (n, scaled), 0 to 1, of the form for deviations (n, contributor) of widened zones."""
         highest = np.zeros(len(deviations))
         for start in range(0, len(deviations), ENVELOPED):
             rows = slice(start, start + ENVELOPED)
             heights = np.einsum("nm,mp->np", deviations[rows, self.scaled], self.heights)
             highest[rows] = heights.max(axis=1)
-        room = np.maximum(self.growth * (deviations[:, self.sizes[0]] - self.limit), 0.0) / 2
-        return np.minimum(room / np.maximum(highest, TINY), 1.0)
+        limits = widening.limits(self.limit, self.sizes)
+        room = np.maximum(self.growth * (deviations[:, self.sizes] - limits), 0.0) / 2
+        return np.minimum(room / np.maximum(highest[:, None], TINY), 1.0).repeat(len(self.scaled), axis=1)
 
 
 def envelopes(nominal: Nominal) -> list[Envelope]:
