@@ -310,13 +310,38 @@ def test_grades_of_sizes_are_choices_and_others_keep_any_range(tmp_path):
     costs = {width: cost + 0.05 / np.sqrt((6 * sigma) ** 2 - width**2)
              for width, cost in zip((0.021, 0.033, 0.052, 0.084), grades.values(), strict=True)}  # fmt: skip
     assert min(costs, key=costs.get) == 0.052 and size == pytest.approx(0.052)
-    assert 0.92 * 0.1043 < height < 0.1043 and found.met.values.all() and found.attrs["choices"] == "table.w.size: IT9"
+    assert (
+        0.92 * 0.1043 < height < 0.1043
+        and found.met.values.all()
+        and found.attrs["choices"] == "table.w.size: IT9 (+0.026 -0.026 mm)"
+    )
     tc.io.write_model(a, tmp_path / "graded.json")
     done = call(
         tmp_path, "allocate", "graded.json", "--require", "top: ppm 10000", "--samples", "4096", "--solver", "daqp",
         "--cost", "table.w.size=IT7:4,IT8:2.5,IT9:1.2,IT10:1.1", "--cost", "block.Z=1",
     )  # fmt: skip
-    assert done.returncode == 0 and "Choices: table.w.size: IT9." in done.stdout
+    assert done.returncode == 0 and "Choices: table.w.size: IT9 (+0.026 -0.026 mm)." in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("declared", "limits", "choice"),
+    [("h9", (-0.04, 0.01), "h8 (0 -0.039 mm)"), ("k8", (-0.01, 0.04), "k8 (+0.039 0 mm)"),
+     ("js9", (-0.02, 0.02), "js8 (+0.0195 -0.0195 mm)"), ((-0.062, 0), (-0.051, -0.011), "IT8 (-0.0115 -0.0505 mm)")],
+)  # fmt: skip
+def test_a_grade_of_a_class_has_the_limits_of_its_letters(declared, limits, choice):
+    """Without a class, its zone is about the middle."""
+    a = tc.Assembly("classes")
+    bar = a.part("bar", tc.Box(100, 50, 20), fixed=True)
+    bar.feature("w", bar.face("+y"), bar.face("-y"), tc.Size(50, declared))
+    a.measure("c", tc.Chain({"bar.w.size": 1}), limits=limits)
+    costs = {"bar.w.size": {"IT7": 5.0, "IT8": 1.5, "IT9": 1.0}}
+    found = tc.analyses.allocate(a, "c: ppm 10000", costs=costs, samples=2048, solver="daqp")
+    assert found.attrs["choices"] == f"bar.w.size: {choice}" and found.met.values.all()
+    lower, upper = sorted(float(x) for x in choice.partition("(")[2].split()[:2])
+    spread = (upper - lower) / 6
+    share = norm.cdf(limits[0], (lower + upper) / 2, spread) + norm.sf(limits[1], (lower + upper) / 2, spread)
+    _, low, high = found.kept.sel(stage="after").values[0]
+    assert low - 1e-3 < share < high + 1e-3
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,18 +54,19 @@ def allocate(
 
     `require` is "corner height: ppm 1000" or "corner height: Ppk 1.33", or a list of such texts. `costs` maps a group that may
     change to a number c, for the cost c * present range / new range, or to a function of the factor, or to a table of choices:
-    {0.1: 4, 0.2: 2.5} of full widths, or {"IT6": 4, "IT7": 2.5} of ISO 286-1 grades for a group with a tc.Size. Groups without
+    {0.1: 4, 0.2: 2.5} of full widths, or {"IT6": 4, "IT7": 2.5} of ISO 286-1 grades for a group with a tc.Size. A size with a
+    class keeps its letters: IT8 of an h9 is h8, with the limits of that class. Any other zone keeps its middle. Groups without
     costs keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`:
     "contributor", "feature" or "part".
 
-    A zone is widened about its middle, and the limits of a size move with it: the bonus of a position at maximum material
-    counts from the limit of the widened size. Ranges without a table stay between a tenth and three times the present ones.
-    Groups keep their ranges, or the next narrower choice, if no required measure changes in any resolved realization with all
-    of them at either end. Each step replaces margins by functions of squared ranges with their values and slopes, on the same
-    draws. SLSQP minimizes the cost within a trust region (a sequential separable approximation; Svanberg, 1987). A step fails
-    if more realizations are then not assemblable than may be outside. Choices come from a linear program with binary unknowns
-    on such functions. If a fresh run does not keep a requirement, the margin of the search grows. `progress` is called with
-    numbers of realizations. Raises OptionError if no range varies. By default there are 8192 `samples`; `model`, `seed`,
+    A zone without grades is widened about its middle, and the limits of a size move with it: the bonus of a position at maximum
+    material counts from the limit of the widened size. Ranges without a table stay between a tenth and three times the present
+    ones. Groups keep their ranges, or the next narrower choice, if no required measure changes in any resolved realization with
+    all of them at either end. Each step replaces margins by functions of squared ranges with their values and slopes, on the
+    same draws. SLSQP minimizes the cost within a trust region (a sequential separable approximation; Svanberg, 1987). A step
+    fails if more realizations are then not assemblable than may be outside. Choices come from a linear program with binary
+    unknowns on such functions. If a fresh run does not keep a requirement, the margin of the search grows. `progress` is called
+    with numbers of realizations. Raises OptionError if no range varies. By default there are 8192 `samples`; `model`, `seed`,
     `solver`, `method`, `into`, `client` and `minutes` are as in all analyses: `tc.analyses.allocate("model.py", "gap: ppm
     1000", by="part")`.
     """
@@ -76,8 +77,8 @@ def allocate(
     requirements = requirements_of(require, program := analysis.program, samples)
     curves = curves_of(costs, groups := _groups(program, by), ranges := _ranges(program, groups), program)
     analysis.expect(_expected(samples, len(groups)))
-    trials = ScaledTrials(analysis, list(groups.values()), requirements)
     prices = [curves.get(name, constant(0.0)) for name in groups]
+    trials = ScaledTrials(analysis, list(groups.values()), requirements, prices)
     search = Search(trials, prices, np.array([name in curves for name in groups]))
     return analysis.finest(_answers(search, groups, ranges, by))
 
@@ -118,7 +119,7 @@ def _answers(
     before = _estimates(requirements, trials.trial(nothing, verification=1))
     yield lambda: answer(search.latest, before, samples)
     fresh = _allocated(search, _expected(samples, 0))
-    effects = narrowing_effects(trials)
+    effects = narrowing_effects(replace(trials, curves=()))  # about the middles of the zones
     yield lambda: answer(fresh, before, VERIFICATION_FACTOR * samples, effects)
 
 

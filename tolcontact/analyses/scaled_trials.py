@@ -15,6 +15,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, stages
+from tolcontact.analyses.costs import Curve
 from tolcontact.analyses.requirements import MIN_DECISIVE, Corrected, Requirement
 from tolcontact.limits import Limits
 from tolcontact.statistics.intervals import mean
@@ -51,11 +52,13 @@ class ScaledTrials:
     """Simulations with scaled ranges, on the same draws. Logarithms of the factors of the ranges are `logs` (group,).
 
     groups  columns of each group
+    curves  of each group: how the middles of sizes move with their ranges; none if all stay
     """
 
     analysis: Analysis
     groups: Sequence[np.ndarray]
     requirements: Sequence[Requirement]
+    curves: Sequence[Curve] = ()
     _known: dict[str, np.ndarray] = field(default_factory=dict, init=False)
 
     def trial(self, logs: np.ndarray, *, verification: int = 0) -> Trial:
@@ -105,7 +108,10 @@ class ScaledTrials:
         scale = np.ones(len(self.analysis.program.nominal.contributors))
         for log, columns in zip(logs, self.groups, strict=True):
             scale[columns] = np.exp(log)
-        return self.analysis.program.draws.scaled(scale)
+        shifts = np.zeros(len(scale))
+        for log, curve in zip(logs, self.curves, strict=False):
+            shifts[curve.sizes] = curve.shift(log)
+        return self.analysis.program.draws.scaled(scale, shifts)
 
     def changes(self, before: Trial, sets: Iterable[Any], rows: np.ndarray, logs: np.ndarray) -> list[Hits]:
         """Return the rows, out of resolved `rows` (row,) of a trial, that change with other ranges.

@@ -115,7 +115,7 @@ class Draws:
         self._assembly = assembly = nominal.assembly
         self._column = {contributor.label: k for k, contributor in enumerate(self.contributors)}
         self.plan = MONTE_CARLO
-        self._scale = np.ones(len(self.contributors))
+        self._scale, self._shifts = np.ones(len(self.contributors)), np.zeros(len(self.contributors))
         freedoms = self.contributors
         self._middle = np.array([freedom.tolerance.shift if freedom.tolerance else freedom.middle for freedom in freedoms])
         self.correlated = [
@@ -161,13 +161,14 @@ class Draws:
         draws.plan = name
         return draws
 
-    def scaled(self, factors: np.ndarray) -> "Draws":
+    def scaled(self, factors: np.ndarray, shifts: np.ndarray | None = None) -> "Draws":
         """Return draws of the same numbers with zones widened by factors (contributor,), each about its middle.
 
-        The limits of sizes move with their zones: a bonus and an envelope count from the limits of the widened size.
+        Then the middles move by `shifts` (contributor,), in the units of the contributors. The limits of sizes move with their
+        zones: a bonus and an envelope count from the limits of the widened size.
         """
         draws = copy.copy(self)
-        draws._scale = factors
+        draws._scale, draws._shifts = factors, np.zeros(len(factors)) if shifts is None else shifts
         return draws
 
     @property
@@ -201,8 +202,8 @@ class Draws:
         for column, contributor in enumerate(self.contributors):
             u = correlated[column] if column in correlated else numbers(contributor.label)
             deviations[:, column] = contributor.deviations(u)
-        if not (self._scale == 1.0).all():
-            deviations = self._middle + self._scale * (deviations - self._middle)
+        if not (self._scale == 1.0).all() or self._shifts.any():
+            deviations = self._middle + self._scale * (deviations - self._middle) + self._shifts
         measured = zip(self._assembly.populations, self.population_labels, self.populations, strict=True)
         for population, label, (columns, values) in measured:
             deviations[:, columns] = values[population.rows(numbers(label))]
@@ -225,9 +226,9 @@ class Draws:
         """Add shared causes to sizes, scale components by the bonus of their sizes, and add shared causes to the rest."""
         measured = [column for columns, _ in self.populations for column in columns]
         sizes = {int(size) for zone in self._scaling for size in zone.sizes}
-        factors = self._scale.copy()
-        factors[measured] = 1.0
-        widening = Widening(factors, self._middle)
+        factors, shifts = self._scale.copy(), self._shifts.copy()
+        factors[measured], shifts[measured] = 1.0, 0.0
+        widening = Widening(factors, self._middle, shifts)
         self._add_causes(deviations, lambda column: column in sizes)
         for zone in self._scaling:
             is_drawn = ~np.isin(zone.scaled, measured)  # measured parts have used their bonus

@@ -89,14 +89,20 @@ def _unit_widths(zone: tuple[tuple[bytes, bytes], ...], heights: bytes, modes: i
 
 @dataclass(frozen=True, eq=False)
 class Widening:
-    """Factors (contributor,) of the widths of zones, each about its `middle` (contributor,) in the units of the contributor."""
+    """Factors of the widths of zones, each about its middle, and shifts of the middles.
+
+    factors  (contributor,)
+    middle   (contributor,), before the shift, in the units of the contributor
+    shifts   (contributor,), in the units of the contributor
+    """
 
     factors: np.ndarray
     middle: np.ndarray
+    shifts: np.ndarray
 
     def limits(self, limit: float, columns: np.ndarray) -> np.ndarray:
         """Return a limit deviation [mm] of sizes after their zones are widened, by their columns (size,)."""
-        return np.asarray(limit + (self.factors[columns] - 1.0) * (limit - self.middle[columns]))
+        return np.asarray(limit + (self.factors[columns] - 1.0) * (limit - self.middle[columns]) + self.shifts[columns])
 
 
 @dataclass(frozen=True, eq=False)
