@@ -48,6 +48,23 @@ def test_deviations_of_chosen_tolerances_are_wider_about_their_centres_and_the_o
     assert chosen.any() and str(after) != str(before)
 
 
+@pytest.mark.parametrize("outside", [0.0, 0.25, 0.4])
+def test_unequally_disposed_zones_widen_about_their_centres(outside):
+    model = toleranced.block_with("top", tc.Profile(0.4, "A", outside=outside))
+    (labels, before), (_, after) = deviations(model), deviations(model.widened(1.5))
+    chosen = np.array([label.startswith("block.top") for label in labels])
+    centres = np.array([outside - 0.2 if label == "block.top.offset" else 0.0 for label in labels])
+    assert centres.any() and np.allclose((after - centres)[:, chosen], 1.5 * (before - centres)[:, chosen], rtol=0, atol=1e-12)
+
+
+def test_a_narrowed_zone_that_does_not_contain_the_nominal_surface_is_refused():
+    one_sided = toleranced.block_with("top", tc.Profile(0.4, "A", outside=0.4))
+    with pytest.raises(ValueError, match=r'"block.top" has profile 0.4 Ⓤ0.4 A; 0.8 times as wide about its centre, this zone'):
+        one_sided.widened(0.8)
+    uneven = toleranced.block_with("top", tc.Profile(0.4, "A", outside=0.3)).widened(0.8)
+    assert deviations(uneven)[1].any()
+
+
 def test_patterns_widen_with_their_members():
     a = tc.Assembly("pattern")
     block = a.part("block", tc.Box(50, 25, 10))

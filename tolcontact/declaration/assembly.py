@@ -104,7 +104,8 @@ class Assembly(Declarations, Pictured, Checked):
 
         `tc.run(model.widened(1.2, "cover"))`: `names` choose the tolerances of parts, of single locators and features
         ("part.feature"), and of variables; by default all are widened. Populations stay as measured, and Cp and Cpk unchanged.
-        Both models have the same draws, so that tc.compare_runs is by pairs. Raises ValueError for an unknown name.
+        Both models have the same draws, so that tc.compare_runs is by pairs. Raises ValueError for an unknown name, and for an
+        unequally disposed zone that would become too narrow to contain the nominal surface.
         """
         return widened(self, factor, names)  # type: ignore[no-any-return]
 

@@ -30,7 +30,8 @@ def widened(assembly: Any, factor: float, names: Sequence[str]) -> Any:
         if not names or not set(labels).isdisjoint(names):
             name = "tolerances" if isinstance(thing, Feature | Pattern) else "tolerance"
             value = getattr(thing, name)
-            wider = tuple(_wider(t, factor) for t in value) if isinstance(value, tuple) else _wider(value, factor)
+            scaled = [_wider(t, factor, labels[-1]) for t in (value if isinstance(value, tuple) else (value,))]
+            wider = tuple(scaled) if isinstance(value, tuple) else scaled[0]
             for owner in (thing, *vars(thing).get("members", ())):  # the members of a pattern have its tolerances
                 object.__setattr__(owner, name, wider)
     return copied
@@ -50,11 +51,19 @@ def _toleranced(assembly: Any) -> Iterator[tuple[list[str], Any]]:
         yield [variable.name], variable
 
 
-def _wider(tolerance: Any, factor: float) -> Any:
-    """Return a tolerance, a size or a control of a feature that is `factor` times as wide, about its centre."""
+def _wider(tolerance: Any, factor: float, owner: str) -> Any:
+    """Return a tolerance, a size or a control of a feature that is `factor` times as wide, about its centre.
+
+    Raises ValueError for a zone that would no longer contain the nominal surface, which no drawing can state by `outside`.
+    """
     if isinstance(tolerance, GeometricTolerance):
-        outside = None if tolerance.outside is None else factor * tolerance.outside
-        return replace(tolerance, width=factor * tolerance.width, outside=outside)
+        width, outside = factor * tolerance.width, tolerance.outside
+        if outside is not None:
+            outside += (factor - 1) * tolerance.width / 2
+            if not 0 <= outside <= width:
+                fault = f"{factor:g} times as wide about its centre, this zone does not contain the nominal surface"
+                raise ValueError(f'widened: "{owner}" has {tolerance}; {fault}; choose other names, or declare a narrower zone')
+        return replace(tolerance, width=width, outside=outside)
     if not isinstance(tolerance.distribution, str):
         tolerance = replace(tolerance, distribution=_wider_distribution(tolerance.distribution, factor))
     if isinstance(tolerance, Tolerance):
