@@ -90,6 +90,17 @@ def test_fixing_a_group_removes_its_share():
     assert abs(found - estimate) < 3.3 * np.hypot(error, (upper - lower) / 4)
 
 
+def test_a_group_of_correlated_contributors_does_not_hide_a_contributor_of_the_same_name():
+    stack = tc.Stack("names")
+    for name, tolerance in {"a": 0.6, "b": 0.6, "a + b": 1.2, "a + b (2)": 0.6}.items():
+        stack.link(name, 10, tolerance)
+    stack.correlate(["a", "b"], 0.5)
+    stack.gap("gap", tolerance=4)
+    found = tc.analyses.contributions(stack, samples=64)
+    assert found["group"].values.tolist() == ["a + b (3)", "a + b", "a + b (2)"]
+    assert found["linear"].values.ravel() == pytest.approx(np.array([3, 4, 1]) / 8, abs=1e-3)
+
+
 def of_normal(weights, matrix):
     """Shapley effects of a sum of correlated normal numbers, from the variance that each set of them explains."""
     weights, matrix = np.asarray(weights), np.asarray(matrix)

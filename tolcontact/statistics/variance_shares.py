@@ -37,6 +37,7 @@ with the effective degrees of freedom of the spread of the influences. The varia
 holds at a stop comes from few realizations: from fewer than 100, an index has no interval.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -73,7 +74,8 @@ def joined_columns(
 ) -> dict[str, np.ndarray]:
     """Return some columns (k,) by group: all columns of an owner, and the columns of a set, are in the same group.
 
-    owners   of all columns; the name of a group lists the owners of its columns
+    owners   of all columns; the name of a group lists the owners of its columns, and has a number, as in "a + b (2)", if
+             another group or owner already has that name
     """
     first_column: dict[str, int] = {}
     links = [[first_column.setdefault(owner, column), column] for column, owner in enumerate(owners)]
@@ -85,7 +87,20 @@ def joined_columns(
     members: dict[int, list[int]] = {}
     for column in columns.tolist():
         members.setdefault(int(labels[column]), []).append(column)
-    return {" + ".join(dict.fromkeys(owners[k] for k in group)): np.array(group) for group in members.values()}
+    groups: dict[str, np.ndarray] = {}
+    for group in members.values():
+        name, *others = dict.fromkeys(owners[k] for k in group)
+        if others:
+            name = _free_name(" + ".join([name, *others]), {*owners, *groups})
+        groups[name] = np.array(group)
+    return groups
+
+
+def _free_name(name: str, names: set[str]) -> str:
+    """Return a name that is not among `names`: the name itself, or with the first free number."""
+    if name not in names:
+        return name
+    return next(numbered for k in itertools.count(2) if (numbered := f"{name} ({k})") not in names)
 
 
 def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) -> list[LinearShares | None]:

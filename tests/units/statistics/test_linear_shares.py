@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tolcontact.statistics.variance_shares import linear_shares, required_realizations
+from tolcontact.statistics.variance_shares import joined_columns, linear_shares, required_realizations
 
 SLOPES = np.array([3.0, 2.0, 1.0, 0.5, 0.0])
 SIZES = np.array([1.0, 20.0, 0.3, 4.0, 5.0])  # standard deviations, in any units
@@ -100,3 +100,8 @@ def test_measures_that_do_not_vary_have_no_shares():
     assert constant is None and broken is None and good is not None
     with pytest.raises(ValueError, match="expected at least"):
         linear_shares(x[: required_realizations(5) - 1], bad[: required_realizations(5) - 1], ALONE)
+
+
+def test_groups_whose_owners_are_named_alike_have_different_names():
+    groups = joined_columns(["a", "b + c", "a + b", "c"], [[0, 1], [2, 3]], np.arange(4))  # both are "a + b + c"
+    assert {name: columns.tolist() for name, columns in groups.items()} == {"a + b + c": [0, 1], "a + b + c (2)": [2, 3]}
