@@ -2,16 +2,20 @@
 
 import io
 import json
+import re
 
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call, compiled
 from tests.test_ra1 import BASE, MEASURED, TOP, plane_weights
+from tolcontact import vocabulary as terms
 from tolcontact.discretization import discretize
+from tolcontact.report import analysis_text
 from tolcontact.simulation import simulate_block
 
 
@@ -114,6 +118,18 @@ def test_the_command_prints_a_table_json_and_csv(tmp_path):
     table = pd.read_csv(io.StringIO(call(tmp_path, *options, "--csv").stdout))
     assert set(table["contributor"]) >= {"top.A1", "base.C1"} and {"estimate", "lower", "upper"} <= set(table)
     assert call(tmp_path, *options, "--csv", "--json").returncode == 2
+
+
+def test_the_table_lists_what_has_an_effect_whatever_its_units():
+    stack = tc.Stack("units")
+    stack.link("length", 10, 0.02)
+    stack.link("aside", 10, 0.02, sensitivity=1e-5)
+    stack.link("heat", 0, 60, sensitivity=6e-4)  # up to 30 K, 0.018 mm
+    stack.gap("gap")
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(analysis_text(terms.SENSITIVITIES, tc.analyses.sensitivities(stack, samples=8)))
+    listed = re.findall(r"^(heat|length|aside|and 1 with next to no effect)", console.export_text(), flags=re.MULTILINE)
+    assert listed == ["heat", "length", "and 1 with next to no effect"]
 
 
 def test_what_does_nothing_has_no_kinks():

@@ -26,7 +26,7 @@ from tolcontact.report.table import (
 
 BRIEF_TABLES, BRIEF_ROWS = 10, 4  # of a coarse answer in brief: the first tables, and the rows of each that a line has
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are only counted
-SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are only counted
+SMALL_EFFECT = 1e-3  # of the largest effect on a measure, a derivative times a step: smaller ones are only counted
 MAX_HOLDERS = 3  # of a part, in a table
 FEW_NAMES = 3  # of features in a note
 FEW_SEARCHES = 0.25  # of all: if no more than this share end at a value, a remark states that there may be worse ones
@@ -149,9 +149,9 @@ def _slopes(dataset: xr.Dataset) -> Table:
     size = np.fmax(mean, dataset["spread"].max("state").values)
     if not dataset.attrs["realizations"]:  # only nominal derivatives are known
         size = np.abs(dataset["nominal"].values)
-    rows = []
-    for k in np.argsort(-size * dataset["step"].values, kind="stable"):
-        if not size[k] > SMALL_SLOPE * np.nanmax(size, initial=0.0):
+    effects, rows = size * dataset["step"].values, []
+    for k in np.argsort(-effects, kind="stable"):
+        if not effects[k] > SMALL_EFFECT * np.nanmax(effects, initial=0.0):
             continue
         slopes = dataset.isel(contributor=int(k))
         means = [slopes["by_contact"].sel(contact=contact).values for contact in terms.CONTACT_STATES]
@@ -159,7 +159,7 @@ def _slopes(dataset: xr.Dataset) -> Table:
         nominal = f"{float(slopes['nominal']):.3g}" if math.isfinite(slopes["nominal"]) else "kink"
         spread, kinks = f"{float(slopes['spread'][terms.CORRECTED]):.2g}", percent(slopes["changing"].values)
         rows.append([str(slopes["contributor"].values), nominal, *map(number, means), spread, kinks])
-    small = int(np.isfinite(size).sum()) - len(rows)
+    small = int(np.isfinite(effects).sum()) - len(rows)
     title = f"{dataset['measure'].values} ({dataset['measure_units'].values} for a unit of each)"
     columns = ["", "nominal", "apart", "touching", "all", "spread", "kinks"]
     return Table(title, columns, rows, [f"and {small} with next to no effect"] if small else [])
