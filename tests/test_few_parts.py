@@ -134,6 +134,25 @@ def test_what_few_parts_leave_open_needs_parts_and_no_realizations():
     assert all(re.search(r"gap: undecided: about [\d ]+ more realizations\n", printed) for printed in (many, none))
 
 
+@pytest.mark.parametrize("is_population", [False, True])
+@pytest.mark.parametrize("keep", ["measures", "poses", "all"])
+def test_a_summary_without_deviations_states_that_it_leaves_few_parts_out(keep, is_population):
+    stack = supplied(parts=8, limits=(-1, 1)) if not is_population else tc.Stack("population")
+    if is_population:
+        stack.link("link 0", 0, 0.1)
+        stack.gap("gap", limits=(-1, 1))
+        stack.population({"link 0": np.random.default_rng(1).normal(0, SD, 8)})
+    summary = tc.summarize(tc.run(stack, samples=3000, seed=1, keep=keep))
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(summary_text(summary))
+    text, is_left_out = console.export_text(), keep != "all"
+    assert ("which intervals of measurements include: " in text) != is_left_out
+    assert ('from few parts, which no interval includes without deviations (keep="all"): ' in text) == is_left_out
+    assert ('gap: meets its limits; but without what few parts leave open: archive the deviations, keep="all"' in text) == (
+        is_left_out
+    )
+
+
 def test_causes_are_no_parts():
     """What a shared cause adds to a contributor does not widen its own figures."""
     seat = tc.Assembly("seat")

@@ -145,6 +145,8 @@ def reservation(summary: xr.Dataset) -> str:
         texts.append(f"; but parts lie in each other in {percent(share)} of realizations")
     if parts := unexplained_offsets(summary):
         texts.append(f"; but contact moved parts far off their locators: {', '.join(parts)} of realizations")
+    if summary.attrs[terms.PARTS_LEFT_OUT]:
+        texts.append('; but without what few parts leave open: archive the deviations, keep="all"')
     return "".join(texts)
 
 

@@ -188,12 +188,20 @@ class Index(NamedTuple):
         return np.asarray(self.means[world] + growth * self.t)
 
 
+def has_few_parts(results: xr.DataTree) -> bool:
+    """Return whether a contributor is known from few parts, or from a population."""
+    return bool(_parts(results["sample"].to_dataset()).any() or declaration_of(results).get("populations"))
+
+
+def _parts(sample: xr.Dataset) -> np.ndarray:
+    """Return the number of parts behind each contributor, (contributor,)."""
+    return sample[terms.PARTS.name].values if terms.PARTS.name in sample else np.zeros(sample.sizes[terms.CONTRIBUTOR], int)
+
+
 def worlds_of(results: xr.DataTree, count: int) -> Worlds | None:
     """Return the posterior draws for `count` realizations; None if nothing was measured, or no deviations are kept."""
     sample, document = results["sample"].to_dataset(), declaration_of(results)
-    populations = document.get("populations", [])
-    parts = sample[terms.PARTS.name].values if terms.PARTS.name in sample else np.zeros(sample.sizes[terms.CONTRIBUTOR], int)
-    if not (parts.any() or populations) or terms.DEVIATION.name not in sample:
+    if not has_few_parts(results) or terms.DEVIATION.name not in sample:
         return None
     labels = [str(label) for label in sample[terms.CONTRIBUTOR].values]
     x = sample[terms.DEVIATION.name].values[:count].copy()
@@ -201,7 +209,8 @@ def worlds_of(results: xr.DataTree, count: int) -> Worlds | None:
     for variable in document.get("variables", []):
         for label, factor in variable["drives"].items():
             x[:, labels.index(label)] -= factor * driven[:, labels.index(variable["name"])]
-    return Worlds(x, parts, [_measured_rows(population, labels, x) for population in populations])
+    populations = [_measured_rows(population, labels, x) for population in document.get("populations", [])]
+    return Worlds(x, _parts(sample), populations)
 
 
 def _measured_rows(population: Mapping[str, Any], labels: list[str], x: np.ndarray) -> MeasuredRows:

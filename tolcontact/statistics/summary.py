@@ -11,7 +11,7 @@ from tolcontact.errors import ArchiveError
 from tolcontact.readable import Pictured
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
-from tolcontact.statistics.few_parts import with_few_parts, worlds_of
+from tolcontact.statistics.few_parts import has_few_parts, with_few_parts, worlds_of
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, limits, measure_estimates
 from tolcontact.vocabulary import ArchiveVariable
@@ -92,7 +92,10 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
     combinations, smallest = contact.combinations(rows), _smallest_range(results, rows)
     statistics, changes, notes = measure_estimates(rows)
     by_realizations = statistics
-    if worlds := worlds_of(results, count):
+    worlds, texts = worlds_of(results, count), {name: str(results.attrs.get(name, "")) for name in TEXTS}
+    if is_left_out := worlds is None and has_few_parts(results):
+        texts[terms.CORRELATIONS] = texts[terms.CORRELATIONS].replace(terms.KNOWN_FROM_FEW, terms.FEW_LEFT_OUT)
+    if worlds:
         statistics, changes = with_few_parts(rows, worlds, statistics, changes)
     notes[terms.OPEN_BY_PARTS] = _are_open_by_parts(by_realizations, statistics)
     notes[terms.FEW_ROWS] = _have_few_rows(statistics)
@@ -128,7 +131,8 @@ def _estimates(results: xr.DataTree) -> xr.Dataset:
             "datum_shifts": ", ".join(_datum_shifts(results)),
             "smallest_range": smallest,
             terms.INTERFERENCE_DEPTH: float(results.attrs.get(terms.INTERFERENCE_DEPTH, np.nan)),
-            **{name: str(results.attrs.get(name, "")) for name in TEXTS},
+            terms.PARTS_LEFT_OUT: int(is_left_out),
+            **texts,
         },
     )
 

@@ -24,7 +24,7 @@ from tolcontact.features.datum_frames import Shifts
 from tolcontact.features.freedoms import Freedom
 from tolcontact.variation.plans import STREAM, Numbers, planned_numbers
 from tolcontact.variation.spreads import ComponentZone, Envelope, Widening, envelopes, fill_zones
-from tolcontact.vocabulary import MONTE_CARLO
+from tolcontact.vocabulary import KNOWN_FROM_FEW, MONTE_CARLO
 
 MAX_SCORE, SCORES, TERMS = 8.0, 8001, 80
 MIN_EIGENVALUE = 1e-12  # of a matrix of coefficients
@@ -152,7 +152,7 @@ class Draws:
             few[f"{len(population.members)} lots" if population.lots else f"{len(population.values)} parts"].append(label)
         known = [f"{_shortened(labels)} from {count}" for count, labels in few.items()]
         means = [f"{_shortened(labels)} {side.rstrip(',')}" for side, labels in sides.items()]
-        lines += [f"known from few parts, which intervals of measurements include: {'; '.join(known)}"] * bool(known)
+        lines += [f"{KNOWN_FROM_FEW}: {'; '.join(known)}"] * bool(known)
         return lines + [f"means off centre by cpk: {'; '.join(means)}"] * bool(means)
 
     def planned(self, name: str) -> "Draws":

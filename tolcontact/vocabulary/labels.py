@@ -168,6 +168,8 @@ SURFACE = (
 CORRELATIONS = (
     "correlations"  # attribute of archives and summaries: lines on coefficients of each kind, sides of means and few parts
 )
+KNOWN_FROM_FEW = "known from few parts, which intervals of measurements include"  # in these lines, before the contributors
+FEW_LEFT_OUT = 'known from few parts, which no interval includes without deviations (keep="all")'  # the same in summaries
 STORED_COORDINATES = "stored_coordinates"  # attribute of archives and summaries: how exactly files store which parts
 STATED_ERROR_SHARE = 1e-4  # of the smallest tolerance range: a larger error of coordinates in files is reported
 

@@ -26,6 +26,7 @@ MEASURE_LIMITS = (*(f"measure_{bound}" for bound in BOUNDS), "measure_accuracy")
 NOT_A_NUMBER = "measure_not_a_number"  # coordinate: the number of realizations whose value with contact is not a number
 REQUIRED = "measure_required"  # coordinate: number of realizations from which moments would have an interval; 0 if they have
 OPEN_BY_PARTS = "measure_open_by_parts"  # coordinate: 1 if few parts leave more open than realizations do; 0 if not
+PARTS_LEFT_OUT = "few_parts_left_out"  # attribute: 1 if few parts are behind some contributors, and intervals do not include it
 FEW_ROWS = "measure_few_rows"  # coordinate: 1 if measured rows are so few that only the mean and shares have an interval
 MEASURE_STOPS = "measure_stops"  # coordinate: the sides at which corrected values stop, such as "lower"
 
