@@ -11,7 +11,7 @@ from scipy import optimize, stats
 import tolcontact as tc
 from tests.helpers import compiled
 from tolcontact.discretization import discretize
-from tolcontact.report import summary_text
+from tolcontact.report import runs_text, summary_text
 from tolcontact.variation import Draws
 
 PARTS, MEAN, SD = 30, 0.01, 0.02
@@ -151,6 +151,61 @@ def test_a_summary_without_deviations_states_that_it_leaves_few_parts_out(keep, 
     assert ('gap: meets its limits; but without what few parts leave open: archive the deviations, keep="all"' in text) == (
         is_left_out
     )
+
+
+def change(after, before, seeds=(1, 1)):
+    """Return the changes (change_of, interval) of the gap."""
+    models = {"before": before, "after": after}
+    runs = {name: tc.run(model, samples=3000, seed=seed) for (name, model), seed in zip(models.items(), seeds, strict=True)}
+    compared = tc.compare_runs(runs)
+    assert compared.few_parts.values.tolist() == ["included"] * 2
+    return compared.change.sel(run="after", measure="gap", state="raw").values
+
+
+def lot(values, parts, *, is_population, sensitivity=1):
+    stack = tc.Stack("lot")
+    if is_population:
+        stack.link("disc", 0, 0.1, sensitivity=sensitivity)
+        stack.population({"disc": values})
+    else:
+        distribution = stats.norm(values.mean(), values.std(ddof=1))
+        stack.link("disc", 0, tc.Tolerance(distribution=distribution, parts=parts), sensitivity=sensitivity)
+    stack.gap("gap", limits=(-0.05, 0.05))
+    return stack
+
+
+@pytest.mark.parametrize("is_population", [False, True])
+def test_changes_between_suppliers_are_known_as_well_as_the_parts_of_both(is_population):
+    z = stats.norm(MEAN, SD).ppf((np.arange(PARTS) + 0.5) / PARTS)
+    first, second = z, z + 1e-4
+    suppliers = [lot(values, PARTS, is_population=is_population) for values in (second, first)]
+    shift, ratio, share = change(*suppliers, seeds=(1, 2))
+    half = np.sqrt(2) * stats.t(2 * PARTS - 2).ppf(0.975) * z.std(ddof=1) / np.sqrt(PARTS)
+    assert shift[1:] - shift[0] == pytest.approx([-half, half], rel=0.2)  # of 512 draws
+    ends = ratio[0] * np.sqrt(stats.f(PARTS - 1, PARTS - 1).ppf([0.025, 0.975]))
+    assert np.log(ratio[1:]) == pytest.approx(np.log(ends), rel=0.15 if not is_population else 0.35)
+    assert share[1] < -0.02 and share[2] > 0.02
+
+
+@pytest.mark.parametrize("is_population", [False, True])
+def test_changes_between_designs_do_not_depend_on_parts_that_both_have(is_population):
+    values = np.random.default_rng(2).normal(MEAN, SD, PARTS)
+    designs = [lot(values, PARTS, is_population=is_population, sensitivity=s) for s in (-1.1, -1.0)]
+    shift, ratio, _ = change(*designs)
+    assert ratio == pytest.approx([1.1] * 3, abs=1e-3)
+    half = 0.1 * stats.t(PARTS - 1).ppf(0.975) * values.std(ddof=1) / np.sqrt(PARTS)
+    assert np.ptp(shift[1:]) == pytest.approx(2 * half, rel=0.12)
+
+
+def test_a_comparison_without_deviations_states_that_it_leaves_few_parts_out():
+    runs = {keep: tc.run(supplied(), samples=200, keep=keep) for keep in ("all", "measures")}
+    compared = tc.compare_runs(runs | {"known": tc.run(supplied(parts=None), samples=200)})
+    assert compared.few_parts.values.tolist() == ["included", "left out", "none"]
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(runs_text(compared))
+    text = console.export_text()
+    assert text.count("known from few parts, which intervals include") == 1
+    assert text.count('known from few parts, which no interval includes without deviations (keep="all")') == 1
 
 
 def test_causes_are_no_parts():

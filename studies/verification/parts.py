@@ -13,7 +13,8 @@ from scipy import stats
 from studies import tables
 from tolcontact.limits import Limits
 from tolcontact.statistics import capability, intervals
-from tolcontact.statistics.few_parts import NAMES, MeasuredRows, Worlds, widened
+from tolcontact.statistics.few_parts import NAMES, Worlds, widened
+from tolcontact.statistics.measured_rows import MeasuredRows
 from tolcontact.statistics.sample import Sample
 
 FIGURES = "mean", "6 sigma", "outside limits", "Ppk as normal"

@@ -24,6 +24,10 @@ _DRAWS = {
     terms.SAME_SEED: "the same seed, but other draws; changes are realization by realization",
     terms.OTHER_DRAWS: "other draws; the runs are compared as independent samples",
 }
+_FEW_PARTS = {
+    terms.OPEN_INCLUDED: "known from few parts, which intervals include; different parts of two runs count as independent",
+    terms.OPEN_LEFT_OUT: 'known from few parts, which no interval includes without deviations (keep="all")',
+}
 
 
 def runs_text(comparison: xr.Dataset) -> Group:
@@ -49,6 +53,8 @@ def runs_lines(comparison: xr.Dataset) -> Iterator[str]:
         ]
         if name != comparison.attrs["reference_run"]:
             lines.append(_DRAWS[str(run["draws"].values)])
+        if text := _FEW_PARTS.get(str(run[terms.FEW_PARTS].values)):
+            lines.append(text)
         yield "\n  ".join(lines)
     if left_out := comparison.attrs["left_out"]:
         yield f"not in all runs, and left out: {left_out}"

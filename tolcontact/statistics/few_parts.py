@@ -23,21 +23,21 @@ has Student's, t s / n^(1/2).
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import compress
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.declaration import Population
 from tolcontact.limits import Limits
 from tolcontact.realizations import column, declaration_of, is_assembled, statuses
 from tolcontact.statistics import capability
 from tolcontact.statistics.intervals import CONFIDENCE
 from tolcontact.statistics.measure_statistics import MIN_VALUES, STATISTICS, MeasuredValues, limits
+from tolcontact.statistics.measured_rows import MeasuredRows, measured_rows, sources
 from tolcontact.statistics.variance_shares import required_realizations
 
 WORLDS = 512  # a power of 2: the points of a Sobol' sequence
@@ -53,37 +53,6 @@ NAMES = list(STATISTICS)
 BOUNDS = [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2]
 
 
-class MeasuredRows(NamedTuple):
-    """A population of measured parts.
-
-    columns         of the deviations
-    of_realization  (realization,) the row that each realization has
-    counts          (row,) how often each row occurs
-    by_lot          (lot, row) how often in each lot, if realizations draw a lot first
-    """
-
-    columns: np.ndarray
-    of_realization: np.ndarray
-    counts: np.ndarray
-    by_lot: np.ndarray | None = None
-
-    @property
-    def known(self) -> int:
-        """The number of independent draws that the population is known from: parts, or lots."""
-        return int(self.counts.sum()) if self.by_lot is None else len(self.by_lot)
-
-    def weights(self, rng: np.random.Generator) -> np.ndarray:
-        """Return weights (world, row) of the rows: of the parts in each lot, and of the lots."""
-        if self.by_lot is None:
-            return np.asarray(rng.dirichlet(self.counts, WORLDS) * self.counts.sum() / self.counts)
-        shares = rng.dirichlet(np.ones(len(self.by_lot)), WORLDS)
-        drawn = np.zeros((WORLDS, len(self.counts)))
-        for lot, counts in enumerate(self.by_lot):
-            rows = np.flatnonzero(counts)
-            drawn[:, rows] += shares[:, lot, None] * rng.dirichlet(counts[rows], WORLDS)
-        return np.asarray(drawn / (self.by_lot / self.by_lot.sum(axis=1, keepdims=True)).mean(axis=0))
-
-
 class Worlds:
     """Posterior draws for contributors that are known from few parts.
 
@@ -91,20 +60,36 @@ class Worlds:
     parts        (contributor,) number of parts behind a mean and a standard deviation; 0 if these are known
     populations  measured rows
     luck         (world,) numbers between 0 and 1 for the error of the run itself
+    sources      (contributor + population,) numbers of what each is known from: equal sources have the same draws in all runs
+                 that have them, and other sources independent ones; None draws all of a run together, which spreads them better
     """
 
-    def __init__(self, deviations: np.ndarray, parts: np.ndarray, populations: Sequence[MeasuredRows] = ()) -> None:
+    def __init__(
+        self,
+        deviations: np.ndarray,
+        parts: np.ndarray,
+        populations: Sequence[MeasuredRows] = (),
+        sources: Sequence[int] | None = None,
+    ) -> None:
         rng = np.random.default_rng(0)
         self._x, self._columns, self._populations = deviations, np.flatnonzero(parts), populations
         n, x = parts[self._columns], deviations[:, self._columns]
         u = scipy.stats.qmc.Sobol(2 * len(n) + 2, rng=rng).random(WORLDS).clip(MIN_UNIFORM, 1 - MIN_UNIFORM)
+        generators = [rng] * len(populations) if sources is None else [*map(np.random.default_rng, sources[len(parts) :])]
+        if sources is not None:
+            for k, column in enumerate(self._columns.tolist()):
+                u[:, [2 + k, 2 + len(n) + k]] = _latin_hypercube(np.random.default_rng(sources[column]))
         scale = np.sqrt((n - 1) / scipy.special.chdtri(n - 1, u[:, 2 : 2 + len(n)]))
         self._means, self._spreads = x.mean(axis=0), x.std(axis=0)
         self._mean_changes = self._spreads * scale * scipy.special.ndtri(u[:, 2 + len(n) :]) / np.sqrt(n)
         self._scale = scale
         self._correlation = np.atleast_2d(np.corrcoef(x.T)) if len(n) else np.zeros((0, 0))
-        self._row_weights = [rows.weights(rng) for rows in populations]
+        self._row_weights = [rows.weights(r, WORLDS) for rows, r in zip(populations, generators, strict=True)]
         self.luck, self._unseen = u[:, 0], u[:, 1]
+
+        self.has_rows = bool(populations)
+        few = range(len(parts), len(sources)) if sources is not None else ()
+        self.sources = frozenset(sources[k] for k in (*self._columns, *few)) if sources is not None else frozenset[int]()
 
     @property
     def moves(self) -> bool:
@@ -159,6 +144,11 @@ class Worlds:
             yield weights / weights.sum(axis=1, keepdims=True)
 
 
+def _latin_hypercube(rng: np.random.Generator) -> np.ndarray:
+    """Return points (world, 2) in the unit square."""
+    return (rng.permuted(np.tile(np.arange(WORLDS), (2, 1)), axis=1).T + rng.random((WORLDS, 2))) / WORLDS
+
+
 class Index(NamedTuple):
     """The contributors of few parts in one number, as a measurement depends on them.
 
@@ -198,32 +188,23 @@ def _parts(sample: xr.Dataset) -> np.ndarray:
     return sample[terms.PARTS.name].values if terms.PARTS.name in sample else np.zeros(sample.sizes[terms.CONTRIBUTOR], int)
 
 
-def worlds_of(results: xr.DataTree, count: int) -> Worlds | None:
-    """Return the posterior draws for `count` realizations; None if nothing was measured, or no deviations are kept."""
+def worlds_of(results: xr.DataTree, count: int, *, by_source: bool = False) -> Worlds | None:
+    """Return the posterior draws for `count` realizations; None if nothing was measured, or no deviations are kept.
+
+    With `by_source`, what has the same declaration in several runs has the same draws there (see Worlds).
+    """
     sample, document = results["sample"].to_dataset(), declaration_of(results)
     if not has_few_parts(results) or terms.DEVIATION.name not in sample:
         return None
-    labels = [str(label) for label in sample[terms.CONTRIBUTOR].values]
+    labels, parts = [str(label) for label in sample[terms.CONTRIBUTOR].values], _parts(sample)
     x = sample[terms.DEVIATION.name].values[:count].copy()
     driven = x.copy()
     for variable in document.get("variables", []):
         for label, factor in variable["drives"].items():
             x[:, labels.index(label)] -= factor * driven[:, labels.index(variable["name"])]
-    populations = [_measured_rows(population, labels, x) for population in document.get("populations", [])]
-    return Worlds(x, _parts(sample), populations)
-
-
-def _measured_rows(population: Mapping[str, Any], labels: list[str], x: np.ndarray) -> MeasuredRows:
-    columns, gauge, lots = (tuple(population.get(name, ())) for name in ("columns", "gauge", "lots"))
-    drawn = Population(columns, np.array(population["values"], dtype=float), gauge=gauge, lots=lots).drawn
-    values, row, counts = np.unique(drawn, axis=0, return_inverse=True, return_counts=True)
-    by_lot = np.zeros((len(set(lots)), len(values)), dtype=int)
-    if lots:
-        np.add.at(by_lot, (np.unique(lots, return_inverse=True)[1], row.ravel()), 1)
-    scale = np.where(np.ptp(values, axis=0) > 0, np.ptp(values, axis=0), 1.0)
-    indices = [labels.index(label) for label in columns]
-    of_realization = scipy.spatial.cKDTree(values / scale).query(x[:, indices] / scale)[1]
-    return MeasuredRows(np.array(indices), of_realization, counts, by_lot if lots else None)
+    declared = document.get("populations", [])
+    numbers = sources(document, labels) if by_source else None
+    return Worlds(x, parts, [measured_rows(population, labels, x) for population in declared], numbers)
 
 
 def with_few_parts(
@@ -248,7 +229,7 @@ def with_few_parts(
             of_change = {terms.SHIFT: corrected[:, 0] - raw[:, 0], terms.SPREAD_RATIO: ratio, terms.VARIANCE_RATIO: ratio**2}
             for estimate, name in zip(changes[number], terms.CHANGES, strict=True):
                 stretch = float(np.max([worlds.stretch(index, name) for index in indices]))  # NaN if one is
-                estimate[1:] = _joined(estimate, of_change[name], stretch, is_positive=name != terms.SHIFT)
+                estimate[1:] = joined(estimate, of_change[name], stretch, is_positive=name != terms.SHIFT)
     return statistics, changes
 
 
@@ -268,11 +249,11 @@ def widened(
             lower, upper = bounds[:, terms.SHARES.index(name)]
             estimate[1:] = np.minimum(estimate[1], lower), np.maximum(estimate[2], upper)
         else:
-            estimate[1:] = _joined(estimate, draws, worlds.stretch(index, name), is_positive=name in POSITIVE)
+            estimate[1:] = joined(estimate, draws, worlds.stretch(index, name), is_positive=name in POSITIVE)
     return estimates, drawn
 
 
-def _joined(estimate: np.ndarray, drawn: np.ndarray, stretch: float, *, is_positive: bool) -> np.ndarray:
+def joined(estimate: np.ndarray, drawn: np.ndarray, stretch: float, *, is_positive: bool) -> np.ndarray:
     """Return the bounds of an estimate (value, lower, upper), with draws (world,) as an independent error on either side.
 
     stretch   how many times wider the interval is than the spread of the draws; NaN: there is no interval
@@ -292,7 +273,7 @@ def _joined(estimate: np.ndarray, drawn: np.ndarray, stretch: float, *, is_posit
 def _draws(worlds: Worlds, index: Index, y: np.ndarray, of_measure: Limits, kept: Limits) -> tuple[np.ndarray, np.ndarray]:
     """Return statistics (world, statistic) of values y (realization,), NaN if they do not exist, and bounds (2, share)."""
     order = np.argsort(y)[: int(np.isfinite(y).sum())]  # NaN come last
-    parts = [(_weighted(y[order], w[:, order], of_measure, kept), 1 / (w**2).sum(axis=1)) for w in worlds.weights(index)]
+    parts = [(weighted(y[order], w[:, order], of_measure, kept), 1 / (w**2).sum(axis=1)) for w in worlds.weights(index)]
     drawn, effective = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     first = NAMES.index(terms.BELOW)
     shares = _share_draws(worlds.luck, drawn[:, first : first + len(terms.SHARES)], effective[:, None])
@@ -310,7 +291,7 @@ def _draws(worlds: Worlds, index: Index, y: np.ndarray, of_measure: Limits, kept
     return drawn, bounds.T
 
 
-def _weighted(y: np.ndarray, weights: np.ndarray, of_measure: Limits, kept: Limits) -> np.ndarray:
+def weighted(y: np.ndarray, weights: np.ndarray, of_measure: Limits, kept: Limits) -> np.ndarray:
     """Return the `STATISTICS` (world, statistic) of ascending values y (realization,) for weights (world, realization).
 
     The sum of weights is below 1 if other realizations have no value.

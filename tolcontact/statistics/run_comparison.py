@@ -12,6 +12,8 @@ from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
 from tolcontact.realizations import assembled, declaration_of, is_assembled, pieces, statuses
 from tolcontact.statistics import intervals
+from tolcontact.statistics.few_parts import Worlds, has_few_parts, worlds_of
+from tolcontact.statistics.few_parts_of_runs import MeasureOfRun, widened_changes
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
 from tolcontact.statistics.summary import summarize
@@ -29,10 +31,13 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
         by_status    (run, status_meaning)     number of realizations
         penetration  (run, state)              largest true penetration of any contact point [mm]
         draws        (run)                     "same", "same seed" or "other", compared with the first run
+        few_parts    (run)                     "included" or "left out": what few measured parts leave open; "none" without any
 
     Runs with the same seed are compared realization by realization, up to the length of the shorter one; others as independent
-    runs. Raises OptionError if they share no measurement of the same name, units and quantity, and ArchiveError for a run with
-    too few finished realizations.
+    runs. Intervals include what few measured parts leave open if the deviations are archived. Equal populations, and equal
+    distributions and numbers of parts of a contributor, are known from the same parts; other parts are independent. Raises
+    OptionError if the runs share no measurement of the same name, units and quantity, and ArchiveError for a run with too few
+    finished realizations.
     """
     (reference_name, reference), *_ = runs.items()
     summaries = {name: summarize(run) for name, run in runs.items()}
@@ -53,25 +58,9 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
         terms.PENETRATION.name: [summary[terms.PENETRATION.name].values for summary in summaries.values()],
         "draws": draws,
     }
-    units = summaries[reference_name].sel(measure=shared)[terms.MEASURE_UNITS.name].values.astype(str)
-    bounds = {
-        name: np.array([summary[name].sel(measure=shared) for summary in summaries.values()]) for name in terms.MEASURE_LIMITS
-    }
     return xr.Dataset(
         {variable.name: variable.entry(np.array(values[variable.name])) for variable in terms.COMPARED_RUNS},
-        coords={
-            terms.RUN: list(runs),
-            terms.STATE: list(terms.STATES),
-            terms.MEASURE: shared,
-            terms.STATISTIC: list(terms.COMPARED_STATISTICS),
-            terms.CHANGE_OF: list(terms.CHANGES_OF_RUNS),
-            terms.INTERVAL: list(terms.ESTIMATE),
-            terms.STATUS_MEANING: list(terms.STATUS_MEANINGS),
-            terms.MEASURE_UNITS.name: (terms.MEASURE, units),
-            **{name: ((terms.RUN, terms.MEASURE), limits) for name, limits in bounds.items()},
-            "realizations": (terms.RUN, [summary.attrs["realizations"] for summary in summaries.values()]),
-            "title": (terms.RUN, [summary.attrs["title"] for summary in summaries.values()]),
-        },
+        coords=_coordinates(runs, summaries, shared),
         attrs={
             "title": f"comparison of {len(runs)} runs",
             "reference_run": reference_name,
@@ -87,10 +76,40 @@ def _shared_measures(summaries: Mapping[str, xr.Dataset]) -> list[str]:
     return [str(row[0]) for row in tables[0] if all(row in table for table in tables)]
 
 
+def _coordinates(runs: Mapping[str, xr.DataTree], summaries: Mapping[str, xr.Dataset], shared: list[str]) -> dict[str, Any]:
+    """Return the labels of all dimensions, and what describes the runs and the `shared` measures."""
+    reference = next(iter(summaries.values()))
+    units = reference.sel(measure=shared)[terms.MEASURE_UNITS.name].values.astype(str)
+    bounds = {
+        name: np.array([summary[name].sel(measure=shared) for summary in summaries.values()]) for name in terms.MEASURE_LIMITS
+    }
+    return {
+        terms.RUN: list(runs),
+        terms.STATE: list(terms.STATES),
+        terms.MEASURE: shared,
+        terms.STATISTIC: list(terms.COMPARED_STATISTICS),
+        terms.CHANGE_OF: list(terms.CHANGES_OF_RUNS),
+        terms.INTERVAL: list(terms.ESTIMATE),
+        terms.STATUS_MEANING: list(terms.STATUS_MEANINGS),
+        terms.MEASURE_UNITS.name: (terms.MEASURE, units),
+        **{name: ((terms.RUN, terms.MEASURE), limits) for name, limits in bounds.items()},
+        "realizations": (terms.RUN, [summary.attrs["realizations"] for summary in summaries.values()]),
+        terms.FEW_PARTS: (terms.RUN, [_few_parts(runs[name], summary) for name, summary in summaries.items()]),
+        "title": (terms.RUN, [summary.attrs["title"] for summary in summaries.values()]),
+    }
+
+
 def _left_out(summaries: Mapping[str, xr.Dataset], shared: list[str]) -> str:
     """Return the names of the measures that are not compared."""
     names = dict.fromkeys(str(name) for summary in summaries.values() for name in summary[terms.MEASURE].values)
     return ", ".join(name for name in names if name not in shared)
+
+
+def _few_parts(run: xr.DataTree, summary: xr.Dataset) -> str:
+    """Return whether a run has contributors that are known from few parts, and intervals include or leave out what is open."""
+    if not has_few_parts(run):
+        return terms.NO_FEW_PARTS
+    return terms.OPEN_LEFT_OUT if summary.attrs[terms.PARTS_LEFT_OUT] else terms.OPEN_INCLUDED
 
 
 def _draws(run: xr.DataTree, reference: xr.DataTree, count: int) -> str:
@@ -131,6 +150,7 @@ def _changes(
         )
         for tree, count in zip((run, reference), counts, strict=True)
     ]
+    worlds = [worlds_of(tree, count, by_source=True) for tree, count in zip((run, reference), counts, strict=True)]
     is_paired, changes, furthest = draws != terms.OTHER_DRAWS, [], []
     nothing = [UNDEFINED] * len(terms.CHANGES_OF_RUNS)
     existing = assembled(*rows) if is_paired else [*itertools.chain(*map(assembled, rows))]
@@ -144,7 +164,9 @@ def _changes(
         limits = [Limits(*(float(selection[name]) for name in terms.MEASURE_LIMITS)) for selection in selections]
         hits = [_hits(*arguments, state) for arguments in zip(rows, numbers, limits, strict=True)]
         has_values = min(sample.count, baseline.count) > 1
-        changes.append(_estimates(sample, baseline, hits, paired=is_paired) if has_values else nothing)
+        estimates = _estimates(sample, baseline, hits, paired=is_paired) if has_values else nothing
+        both = itertools.starmap(_measure_of_run, zip(worlds, rows, numbers, limits, selections, [state] * 2, strict=True))
+        changes.append(widened_changes(estimates, *both) if any(worlds) else estimates)
         is_compared = draws == terms.SAME_DRAWS and sample.count
         furthest.append(float(np.abs(sample.values - baseline.values).max()) if is_compared else np.nan)
     shape = (len(terms.STATES), len(measures))
@@ -158,6 +180,16 @@ def _hits(rows: xr.Dataset, measure: int, limits: Limits, state: str) -> Sample 
         return None if limits.are_open else values.map(limits.outside)
     exists = is_assembled(statuses(rows))
     return values.map(lambda x: limits.outside(x) | ~exists)
+
+
+def _measure_of_run(
+    worlds: Worlds | None, rows: xr.Dataset, measure: int, limits: Limits, summary: xr.Dataset, state: str
+) -> MeasureOfRun:
+    """Return a measurement, given by its index in the rows and its summary, in a state."""
+    values = measured_sample(rows, measure, state).values
+    exists = is_assembled(statuses(rows)) | (state == terms.STATES[terms.RAW])
+    outside = summary[terms.STATISTIC_VALUE.name].sel({terms.STATE: state, terms.STATISTIC: terms.OUTSIDE}).values
+    return MeasureOfRun(worlds, np.where(exists, values, np.nan), limits, Estimate(*map(float, outside)))
 
 
 def _estimates(sample: Sample, baseline: Sample, hits: list[Sample | None], *, paired: bool) -> list[Estimate]:

@@ -127,6 +127,7 @@ COMPARED = (
 # The comparison of runs.
 SAME_DRAWS, SAME_SEED, OTHER_DRAWS = "same", "same seed", "other"
 COMPARED_STATISTICS = (MEAN, SIX_SIGMA, PPK, OUTSIDE)
+FEW_PARTS, NO_FEW_PARTS, OPEN_INCLUDED, OPEN_LEFT_OUT = "few_parts", "none", "included", "left out"  # coordinate, its values
 SHARE_SHIFT = "shift of the share outside"
 CHANGES_OF_RUNS = (SHIFT, SPREAD_RATIO, SHARE_SHIFT)
 COMPARED_RUNS = (
