@@ -243,6 +243,11 @@ class _Problem:
         contributors, binaries = len(region.lower), 0 if limits is None else len(model.gaps)
         self._width = contributors + self._freedoms + 2 * binaries
         self._integer = np.r_[np.zeros(self._width - binaries), np.ones(binaries)]
+        # The solver's tolerances are absolute: variables are multiples of half their ranges, of a length, and of reactions.
+        halves = (region.upper - region.lower) / 2
+        motions = np.full(self._freedoms, _length(region.slopes(model.gaps_by_deviations) * halves))
+        reactions = np.zeros(0) if limits is None else limits[1]
+        self._scales = np.concatenate([np.where(halves > 0, halves, 1.0), motions, reactions, np.ones(binaries)])
         lower, upper = np.full(self._width, -np.inf), np.full(self._width, np.inf)
         lower[:contributors], upper[:contributors] = region.lower, region.upper
         self._constraints: list[scipy.optimize.LinearConstraint] = []
@@ -259,7 +264,7 @@ class _Problem:
             self._constraints += self._rows(balance, 0, 0)
             self._constraints += self._rows(np.hstack([np.zeros_like(gaps), eye, -largest_reaction * eye]), -np.inf, 0)
             self._constraints += self._rows(np.hstack([gaps, zeros, largest_gap * eye]), -np.inf, largest_gap - model.gaps)
-        self._bounds = scipy.optimize.Bounds(lower, upper)
+        self._bounds = scipy.optimize.Bounds(lower / self._scales, upper / self._scales)
 
     def _limits(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Return bounds of gaps at a corrected pose (row,) [mm], and of reactions (row,).
@@ -286,30 +291,43 @@ class _Problem:
         return np.maximum(highest + opening, 1e-9), np.full(len(A), max(deepest, 1e-9) * energy**2)
 
     def _rows(self, rows: np.ndarray, lower: np.ndarray | float, upper: np.ndarray | float) -> list[Any]:
-        """Return the constraint with rows (row, variable) of the first variables; nothing if there are no rows."""
-        padded = np.pad(rows, ((0, 0), (0, self._width - rows.shape[1])))
-        return [scipy.optimize.LinearConstraint(padded, lower, upper)] if len(rows) else []
+        """Return the constraint with rows (row, variable) of the first variables; nothing if there are no rows.
+
+        Each row is scaled so that its largest coefficient of a scaled variable is 1.
+        """
+        padded = np.pad(rows, ((0, 0), (0, self._width - rows.shape[1]))) * self._scales
+        largest = np.abs(padded).max(axis=1, initial=0.0)
+        factors = 1 / np.where(largest > 0, largest, 1.0)
+        constraint = scipy.optimize.LinearConstraint(padded * factors[:, None], lower * factors, upper * factors)
+        return [constraint] if len(rows) else []
 
     def bound(self, measure: int, sense: int) -> float:
         """Return an upper bound of sense * (measure - nominal); infinite if there is none."""
         goal, contributors = np.zeros(self._width), len(self._region.lower)
         goal[:contributors] = sense * self._region.slopes(self._model.by_deviations[measure])
         goal[contributors : contributors + self._freedoms] = sense * self._model.by_motion[measure, : self._freedoms]
+        goal *= self._scales
+        largest = float(np.abs(goal).max(initial=0.0)) or 1.0
         constraints, bound, (planes, ends) = list(self._constraints), np.inf, self._region.planes()
         for _ in range(MAX_ROUNDS):
             constraints += self._rows(planes, -np.inf, ends)
             # With presolve, HiGHS prints a line when an integer solution needs another solve in the space of all variables.
             solution = scipy.optimize.milp(
-                -goal, constraints=constraints, bounds=self._bounds, integrality=self._integer,
+                -goal / largest, constraints=constraints, bounds=self._bounds, integrality=self._integer,
                 options={"time_limit": MAX_SECONDS, "presolve": not self._integer.any()},
             )  # fmt: skip
             if solution.x is None:
                 break
-            bound = min(bound, -float(solution.mip_dual_bound if self._integer.any() else solution.fun))
-            planes, ends = self._region.planes(solution.x[:contributors], SLACK)
+            bound = min(bound, -largest * float(solution.mip_dual_bound if self._integer.any() else solution.fun))
+            planes, ends = self._region.planes((solution.x * self._scales)[:contributors], SLACK)
             if not len(planes):
                 break
         return bound
+
+
+def _length(gap_changes: np.ndarray) -> float:
+    """Return the largest sum of changes [mm] of a gap, from the largest changes (row, contributor); 1 mm if there are none."""
+    return float(np.abs(gap_changes).sum(axis=1).max(initial=0.0)) or 1.0
 
 
 def _hessian(model: LinearModel) -> np.ndarray:

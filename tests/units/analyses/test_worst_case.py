@@ -17,6 +17,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.extreme_search import Evaluation, Searcher
+from tolcontact.analyses.linear_model import farthest_poses, linear_model
 from tolcontact.analyses.searches import Effort
 from tolcontact.analyses.worst_case import search_worst_case
 
@@ -63,6 +64,19 @@ def test_a_clutch_has_the_worst_cases_of_its_formula():
     labels = ["hub.flat.offset", "roller.barrel.size", "ring.bore.size"]
     assert last.sel(contributor=labels).values == pytest.approx([-0.05, -0.02, 0.025], abs=1e-9)
     assert not np.isfinite(values(found, of="bound")).any()
+
+
+@pytest.mark.parametrize("slope", [1e-3, 4e-8, 1e-10])
+def test_a_bound_does_not_depend_on_the_units_of_a_contributor(slope):
+    """A pressure in Pa moves the locator by the same 0.04 mm as in MPa, in addition to its own 0.05 mm."""
+    a = tc.Assembly("vessel")
+    block = a.part("block", tc.Box(50, 30, 10))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=0.1)
+    a.variable("pressure", tc.Tolerance(0.08 / slope), drives={"block.C1": slope}, units="Pa")
+    a.measure("place", block.point(0, 15, 5), along="x")
+    program = compiled(a, solver="daqp")
+    bounds = farthest_poses(program, AllowedRegion(program.draws, seed=1), linear_model(program))
+    assert bounds == pytest.approx(np.array([[[-0.09, 0.09]] * 2]), abs=1e-9)
 
 
 def test_what_is_found_is_what_the_engine_says_of_the_combination():
