@@ -154,6 +154,31 @@ def test_a_chain_of_an_assembly_is_its_measure_until_contact_moves_parts():
     assert re.search(r"RSS, with contact is off by -0\.\d+ at the minimum", text)
 
 
+def bent(slope):
+    """Return the larger of two lengths C + slope T and C - slope T: C +-0.005 mm, and slope T +-0.03 mm."""
+    stack = tc.Stack("bent")
+    stack.link("C", 1, 0.01)
+    stack.link("T", 0, 0.06 / slope)
+    for name, sense in (("up", 1), ("down", -1)):
+        stack.gap(name, {"C": 1, "T": sense * slope})
+    stack.measure("larger", tc.Maximum("up", "down"))
+    return stack
+
+
+@pytest.mark.parametrize("slope", [1.0, 1e-3, 1e-7])
+def test_a_kink_has_no_linear_figures_in_any_units(slope):
+    """The larger length is C + slope |T|, whose slope by T is undefined as drawn, however small it is per unit of T."""
+    stack = bent(slope)
+    half_width = tc.analyses.stack_up(stack, samples=64).half_width
+    assert np.isnan(half_width.sel(measure="larger")).all()
+    assert float(half_width.sel(measure="up").isel(approach=0)) == pytest.approx(0.035)
+    derivatives = tc.analyses.sensitivities(stack, samples=1000, seed=2)
+    assert np.isnan(derivatives.nominal.sel(measure="larger")).all()
+    # |T| is below the step of 0.01 sigma in 0.8 % of all realizations, and C has no kink.
+    changing = derivatives.changing.sel(interval="estimate")
+    assert 0.001 < float(changing.sel(contributor="T")) < 0.02 and float(changing.sel(contributor="C")) == 0
+
+
 def test_few_realizations_do_not_judge_rss():
     assert "RSS is not judged: 2730 realizations bound the range" in _text(tc.analyses.stack_up(motor(), samples=500), STACK_UP)
 

@@ -10,7 +10,8 @@ The objective "all points" has the same quadratic term everywhere. Here the opti
 a binary variable for each row that may be active or open; HiGHS also gives a bound for this program when its time is up.
 
 A measure with a kink at the nominal assembly (a minimum, a clearance, an angle that is nominally 0) has no linear model, and
-no bound.
+no bound. A kink is judged by effects, which are slopes times three standard deviations of the contributors: slopes of
+contributors in different units are not comparable.
 
 The bounds are of first order in deviations and motions. Pairs of round faces and springy supports have no rows, which only
 widens the bounds.
@@ -28,8 +29,9 @@ from tolcontact.analyses.allowed_space import AllowedRegion
 from tolcontact.compilation import Program
 from tolcontact.mechanics import Group
 
-MAX_SLOPE_DIFFERENCE = 0.1  # of the largest slope of a measure: if forward and backward slopes differ by more, there is a kink
+MAX_DIFFERENCE = 0.1  # of the largest effect on a measure: if forward and backward effects differ by more, there is a kink
 MIN_SLOPE = 1e-6  # of a measure: smaller ones are rounding
+SEED, SAMPLES, THREE_SIGMA = 1, 256, 3.0  # of the deviations that tell how far contributors vary
 STEP = 1e-4  # mm, and rad times the length of a group: steps of central differences; second-order terms cancel
 MAX_ROUNDS = 30
 SLACK = 1e-7  # of a zone's width
@@ -80,7 +82,10 @@ def linear_model(program: Program) -> LinearModel:
     by_deviations, by_motion = (
         [(ahead - behind).T / (2 * STEP) for ahead, behind in zip(*sides, strict=True)] for sides in (varied, moved)
     )
-    kinked = np.array([_kinks(*(ends[0] - measures for ends in sides)) for sides in (varied, moved)])
+    weights = _reaches(program) / STEP, np.ones(len(_freedoms(program)))
+    kinked = np.array([
+        _kinks(*(ends[0] - measures for ends in sides), weight) for sides, weight in zip((varied, moved), weights, strict=True)
+    ])  # fmt: skip
     return LinearModel(
         measures, by_deviations[0], by_motion[0], kinked, gaps, by_deviations[1], by_motion[1], _bilateral_motions(program),
         _displacements(program), sum(gaps is None for gaps in program.gaps),
@@ -99,13 +104,22 @@ def total_derivatives(program: Program) -> np.ndarray:
     return by_deviations + by_deviations @ matrix.T if matrix.any() else by_deviations
 
 
-def _kinks(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
+def _reaches(program: Program) -> np.ndarray:
+    """Return three standard deviations (contributor,) of all deviations in the contributors' units; 0 for constant ones."""
+    deviations = program.draws(seed=SEED, start=0, stop=SAMPLES)
+    return np.asarray(np.where(np.ptp(deviations, axis=0) > 0, THREE_SIGMA * deviations.std(axis=0), 0.0))
+
+
+def _kinks(ahead: np.ndarray, behind: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Return whether each measure has a kink (measure,), from its changes (n, measure) by forward and backward steps.
 
-    At a kink the forward and the backward slope differ by more than a share of the largest slope, or one is not a number.
+    Weights (n,) are ranges in steps. At a kink the forward and the backward change times the weight differ by more than a
+    share of the largest of these effects, or one is not a number.
     """
-    largest = np.maximum(np.abs(ahead), np.abs(behind)).max(axis=0, initial=STEP * MIN_SLOPE)
-    return ~(np.abs(ahead + behind) <= MAX_SLOPE_DIFFERENCE * largest).all(axis=0)
+    differences, weights = np.abs(ahead + behind), weights[:, None]
+    largest = (weights * np.maximum(np.abs(ahead), np.abs(behind))).max(axis=0, initial=0.0)
+    is_small = weights * differences <= MAX_DIFFERENCE * largest
+    return ~(is_small | (differences <= MAX_DIFFERENCE * STEP * MIN_SLOPE)).all(axis=0)
 
 
 def leverages(program: Program) -> np.ndarray:

@@ -21,7 +21,7 @@ from tolcontact.workflow.models import Choice, Model
 
 STEP = 0.01  # of a contributor's standard deviation
 MAX_DIFFERENCE = 0.1  # of a derivative: if its one-sided values differ by more, there is a kink
-NEGLIGIBLE = 0.1  # of the largest derivative of a measure: smaller ones may differ by a tenth of that
+NEGLIGIBLE = 0.1  # of the largest effect of a step on a measure: smaller ones may differ by a tenth of that
 
 
 def sensitivities(
@@ -43,13 +43,14 @@ def sensitivities(
         not_a_number (measure)                                 number of realizations in which the measure with contact, there
                                                                or at a step, is not a number: they are left out
 
-    Each contributor is stepped alone, even if it is drawn jointly with others; a shared cause is stepped with the contributors
-    that it drives. Where the active set is the same before and after the step, and both sides of the step agree within a tenth
-    (or a hundredth of the largest derivative), the central difference is the derivative to second order. Elsewhere it is a mean
-    of both sides and of a jump between them. The linearized resolution may cause jumps, and so may points that enter the
-    objective "active points". (2 contributors + 1) `samples` are simulated, with 1000 samples by default. `progress` is called
-    with the number of finished realizations and the total. `model`, `seed`, `solver`, `method`, `into`, `client` and `minutes`
-    are as in all analyses: `tc.analyses.sensitivities("model.py", samples=500)`.
+    Each contributor is stepped alone, even if it is drawn jointly with others; a shared cause is stepped with the
+    contributors that it drives. Where the active set is the same before and after the step, and both sides of the step agree
+    within a tenth (or a hundredth of the largest effect of any contributor's step), the central difference is the derivative
+    to second order. Elsewhere it is a mean of both sides and of a jump between them. The linearized resolution may cause
+    jumps, and so may points that enter the objective "active points". (2 contributors + 1) `samples` are simulated, with 1000
+    samples by default. `progress` is called with the number of finished realizations and the total. `model`, `seed`,
+    `solver`, `method`, `into`, `client` and `minutes` are as in all analyses: `tc.analyses.sensitivities("model.py",
+    samples=500)`.
     """
     analysis = Analysis(
         terms.SENSITIVITIES, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
@@ -121,7 +122,7 @@ def _values(
     slopes = (ahead + behind) / 2
     carries_otherwise = (carrying[:, up] != carrying[:, :1]).any(axis=2) | (carrying[:, down] != carrying[:, :1]).any(axis=2)
     rounding = program.accuracies / steps[:, None]
-    changes = carries_otherwise | _has_kink(ahead, behind, np.nan_to_num(np.abs(nominal)), rounding)
+    changes = carries_otherwise | _has_kink(ahead, behind, np.nan_to_num(np.abs(nominal)), rounding, steps)
     smooth = np.where(changes[:, :, None], np.nan, slopes[:, :, terms.CORRECTED])
     is_touched = status != terms.Status.UNTOUCHED
     return {
@@ -138,18 +139,22 @@ def _observed(block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return defined_measures(block), block.carrying.copy(), block.status.copy()
 
 
-def _has_kink(ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray, rounding: np.ndarray) -> np.ndarray:
+def _has_kink(
+    ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray, rounding: np.ndarray, steps: np.ndarray
+) -> np.ndarray:  # fmt: skip
     """Return whether any measure has a kink or jump within the step, (n, contributor).
 
     Forward and backward differences `ahead` and `behind` are (n, contributor, state, measure), nominal derivatives (measure,
-    contributor). `rounding` (contributor, measure) is the effect of the solver's rounding on differences. A contributor with
-    almost no effect has no kink.
+    contributor). `rounding` (contributor, measure) is the effect of the solver's rounding on differences, and `steps`
+    (contributor,) make derivatives in different units comparable. A contributor with almost no effect has no kink.
     """
     size = np.maximum(np.abs(ahead), np.abs(behind))
     # (measure, contributor), of the values that are numbers; a jump does not enlarge a median.
     typical = np.ma.median(np.ma.masked_invalid(size.max(axis=2)), axis=0).filled(0.0).T  # type: ignore[no-untyped-call]
-    floor = np.maximum(NEGLIGIBLE * np.maximum(nominal, typical).max(axis=1, initial=0), rounding / MAX_DIFFERENCE)
-    return np.asarray((np.abs(ahead - behind) > MAX_DIFFERENCE * np.maximum(size, floor[:, None])).any(axis=(2, 3)))
+    largest = (np.maximum(nominal, typical) * steps).max(axis=1, initial=0)  # effect of a step, (measure,)
+    floor = np.maximum(NEGLIGIBLE * largest / steps[:, None], rounding / MAX_DIFFERENCE)
+    differs = np.abs(ahead - behind) > MAX_DIFFERENCE * np.maximum(size, floor[:, None])
+    return np.asarray(differs.any(axis=(2, 3)))
 
 
 def _means(slopes: np.ndarray) -> np.ndarray:
