@@ -154,6 +154,19 @@ def test_a_chain_of_an_assembly_is_its_measure_until_contact_moves_parts():
     assert re.search(r"RSS, with contact is off by -0\.\d+ at the minimum", text)
 
 
+@pytest.mark.parametrize("slope", [1e4, 1.0, 1e-6, 1e-10, 1e-14])
+def test_linear_figures_do_not_depend_on_the_units_of_a_link(slope):
+    """A pressure lengthens 1 m by +-0.05 mm, in addition to +-0.01 mm, whatever its units."""
+    stack = tc.Stack("vessel")
+    stack.link("length", 1000, 0.02)
+    stack.link("pressure", 0, 0.1 / slope, sensitivity=slope)
+    stack.gap("end")
+    half_width = tc.analyses.stack_up(stack, samples=64).half_width.values[0]
+    assert half_width[:2] == pytest.approx([0.06, math.hypot(0.01, 0.05)], rel=1e-5)
+    linear = tc.analyses.contributions(stack, samples=64).linear.sel(group="pressure")
+    assert float(linear.squeeze()) == pytest.approx(25 / 26, abs=1e-4)
+
+
 def bent(slope):
     """Return the larger of two lengths C + slope T and C - slope T: C +-0.005 mm, and slope T +-0.03 mm."""
     stack = tc.Stack("bent")
@@ -165,7 +178,7 @@ def bent(slope):
     return stack
 
 
-@pytest.mark.parametrize("slope", [1.0, 1e-3, 1e-7])
+@pytest.mark.parametrize("slope", [1.0, 1e-3, 1e-7, 1e-10])
 def test_a_kink_has_no_linear_figures_in_any_units(slope):
     """The larger length is C + slope |T|, whose slope by T is undefined as drawn, however small it is per unit of T."""
     stack = bent(slope)

@@ -10,8 +10,7 @@ The objective "all points" has the same quadratic term everywhere. Here the opti
 a binary variable for each row that may be active or open; HiGHS also gives a bound for this program when its time is up.
 
 A measure with a kink at the nominal assembly (a minimum, a clearance, an angle that is nominally 0) has no linear model, and
-no bound. A kink is judged by effects, which are slopes times three standard deviations of the contributors: slopes of
-contributors in different units are not comparable.
+no bound. A kink is judged by effects, slopes times three standard deviations, since slopes in different units differ.
 
 The bounds are of first order in deviations and motions. Pairs of round faces and springy supports have no rows, which only
 widens the bounds.
@@ -33,6 +32,7 @@ MAX_DIFFERENCE = 0.1  # of the largest effect on a measure: if forward and backw
 MIN_SLOPE = 1e-6  # of a measure: smaller ones are rounding
 SEED, SAMPLES, THREE_SIGMA = 1, 256, 3.0  # of the deviations that tell how far contributors vary
 STEP = 1e-4  # mm, and rad times the length of a group: steps of central differences; second-order terms cancel
+MIN_STEP, MAX_STEP = 1e-5, 1.0  # of three standard deviations of a contributor: bounds of its step, in its units
 MAX_ROUNDS = 30
 SLACK = 1e-7  # of a zone's width
 MAX_BINARY, MAX_SECONDS = 64, 30.0  # rows that may be active or open; time for one bound
@@ -72,17 +72,19 @@ class LinearModel:
 
 def linear_model(program: Program) -> LinearModel:
     """Return the linear model of a program, by central differences of its Functions."""
-    count = len(program.nominal.contributors)
-    placed = [program.place(deviations=sign * STEP * np.eye(count))["poses"] for sign in (1, -1)]
-    varied = [_observed(program, poses, sign * STEP * np.eye(count)) for poses, sign in zip(placed, (1, -1), strict=True)]
+    count, reaches = len(program.nominal.contributors), _reaches(program)
+    steps = np.where(reaches > 0, np.clip(STEP, MIN_STEP * reaches, MAX_STEP * reaches), STEP)
+    placed = [program.place(deviations=sign * np.diag(steps))["poses"] for sign in (1, -1)]
+    varied = [_observed(program, poses, sign * np.diag(steps)) for poses, sign in zip(placed, (1, -1), strict=True)]
     moved = [
         _observed(program, poses, np.zeros((len(poses), count))) for poses in (_motions(program, 1), _motions(program, -1))
     ]
     (measures,), (gaps,) = _observed(program, _at_rest(program, 1), np.zeros((1, count)))
     by_deviations, by_motion = (
-        [(ahead - behind).T / (2 * STEP) for ahead, behind in zip(*sides, strict=True)] for sides in (varied, moved)
+        [(ahead - behind).T / (2 * step) for ahead, behind in zip(*sides, strict=True)]
+        for sides, step in ((varied, steps), (moved, STEP))
     )
-    weights = _reaches(program) / STEP, np.ones(len(_freedoms(program)))
+    weights = reaches / steps, np.ones(len(_freedoms(program)))
     kinked = np.array([
         _kinks(*(ends[0] - measures for ends in sides), weight) for sides, weight in zip((varied, moved), weights, strict=True)
     ])  # fmt: skip
@@ -244,8 +246,7 @@ def farthest_poses(program: Program, region: AllowedRegion, model: LinearModel) 
 class _Problem:
     """Linear constraints on points x of the region, with motions y if `is_moved`.
 
-    With the optimality conditions of the objective "all points", also on reactions r, and on binaries b of rows that are active
-    (1) or open (0).
+    The optimality conditions of the objective "all points" add reactions r, and binaries b of active (1) or open (0) rows.
     """
 
     def __init__(
@@ -257,7 +258,7 @@ class _Problem:
         contributors, binaries = len(region.lower), 0 if limits is None else len(model.gaps)
         self._width = contributors + self._freedoms + 2 * binaries
         self._integer = np.r_[np.zeros(self._width - binaries), np.ones(binaries)]
-        # The solver's tolerances are absolute: variables are multiples of half their ranges, of a length, and of reactions.
+        # The solver's tolerances are absolute: variables are multiples of half ranges, a length and the largest reactions.
         halves = (region.upper - region.lower) / 2
         motions = np.full(self._freedoms, _length(region.slopes(model.gaps_by_deviations) * halves))
         reactions = np.zeros(0) if limits is None else limits[1]
