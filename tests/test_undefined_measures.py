@@ -1,15 +1,19 @@
 """Measures that are not numbers for some deviations: no answer counts these realizations as good or bad without a word."""
 
+import io
 import json
 import re
 
 import casadi
 import numpy as np
 import pytest
+from rich.console import Console
 from scipy import stats
 
 import tolcontact as tc
 from tests.helpers import call, nightly
+from tolcontact.report import analysis_text
+from tolcontact.vocabulary import SWEEP
 
 SCRIPT = """import tolcontact as tc, casadi as ca
 def assembly():
@@ -148,3 +152,39 @@ def assembly():
     done = call(tmp_path, "summary", "block.nc", "--json")
     figures = json.loads(done.stdout, parse_constant=pytest.fail)["data_vars"]["statistic_value"]["data"]
     assert figures[0][1][0] == [None] * 3 and done.returncode == code
+
+
+def test_a_combination_with_an_undefined_value_is_undefined():
+    """The least and the largest of x and of the root of 0.05 + x, which is undefined below -0.05."""
+    model = block_with(lambda x: casadi.sqrt(0.05 + x))
+    for name, combination in (("largest", tc.Maximum), ("least", tc.Minimum)):
+        model.measure(name, combination("place", "function"), limits=(-1, 1))
+    with tc.run(model, samples=100, surfaces=0, fields="none") as results:
+        place, function, largest, least = results["measured"].sel(state="corrected").transpose("measure", ...).values
+    is_undefined = np.isnan(function)
+    assert 10 < is_undefined.sum() < 50 and np.isfinite(place).all()
+    np.testing.assert_array_equal(largest, np.where(is_undefined, np.nan, np.maximum(place, function)))
+    np.testing.assert_array_equal(least, np.where(is_undefined, np.nan, np.minimum(place, function)))
+
+
+def test_a_swept_measure_that_is_no_number_has_no_share_outside():
+    """Half of the realizations are undefined at the first position, and none at the second."""
+    swept = tc.analyses.sweep(
+        lambda shift: block_with(lambda x: casadi.sqrt(x + shift), limits=(None, 2)), {"shift": [0, 1]}, samples=100
+    )
+    function = swept.sel(measure="function")
+    assert np.isnan(function["outside"]).all() and np.isfinite(swept["outside"].sel(measure="place")).all()
+    assert function["extreme_share"].isel(end=0, position=0).values == pytest.approx([1, 1])
+    console = Console(file=(stream := io.StringIO()), width=120)
+    console.print(analysis_text(SWEEP, swept))
+    text = stream.getvalue()
+    assert re.search(r"function: not a number in [3-6]\d % of the realizations at some position, so it has no envelope", text)
+    assert "nan" not in text
+
+
+def test_a_reason_is_given_why_what_is_no_number_has_no_figure(tmp_path):
+    (script := tmp_path / "block.py").write_text(SCRIPT.replace("ca.if_else(x < 0, ca.log(x), 0.0)", "ca.sqrt(x + 0.25)"))
+    table = call(tmp_path, "stackup", script, "--samples", "3000").stdout
+    assert "RSS is not judged: the measurement is not a number in some realizations." in table
+    done = call(tmp_path, "run", script, "--samples", "1000", "--until", "lg: mean +-0.001", "--quiet")
+    assert "mean of lg has no value (it is not a number in some realizations); no more" in done.stderr

@@ -39,7 +39,8 @@ def sweep(
                                                      largest value over all positions: 0.135 % of the least, 99.865 % of the
                                                      largest
         outside        (measure, state, interval)    share of realizations beyond a limit at any position; with contact also of
-                                                     those that cannot be assembled there; NaN without limits
+                                                     those that cannot be assembled there; NaN without limits,
+                                                     or if the measure is not a number in any realization
         extreme_share  (measure, state, end, position)  share of realizations whose least or largest value is at a position
         mean           (measure, state, position, interval)  mean at each position
         swept          (position, realization, state, measure)  all values
@@ -157,16 +158,19 @@ def _envelope(x: np.ndarray, fails: np.ndarray, limits: Sequence[Limits]) -> tup
     fails  (position, realization) whether parts cannot be assembled
     """
     is_outside = (fails | np.array([limit.outside(row) for limit, row in zip(limits, x, strict=True)])).any(axis=0)
+    is_defined = bool((np.isfinite(x) | fails).all())  # a value that is not a number is neither inside nor outside
     assembled = x[:, ~fails.any(axis=0)]
+    defined = assembled[:, np.isfinite(assembled).all(axis=0)]
     ends, shares = [], []
     for extremes, places, percent in (
-        (assembled.min(axis=0), assembled.argmin(axis=0), PERCENTS[0]),
-        (assembled.max(axis=0), assembled.argmax(axis=0), PERCENTS[-1]),
+        (assembled.min(axis=0), defined.argmin(axis=0), PERCENTS[0]),
+        (assembled.max(axis=0), defined.argmax(axis=0), PERCENTS[-1]),
     ):
         ends.append(_estimates(extremes, percent))
-        shares.append(np.bincount(places, minlength=len(x)) / max(len(extremes), 1))
+        shares.append(np.bincount(places, minlength=len(x)) / max(len(places), 1))
     means = [_estimates(row[~failed], PERCENTS[0])[0] for row, failed in zip(x, fails, strict=True)]
-    outside = intervals.UNDEFINED if all(limit.are_open for limit in limits) else intervals.proportion(is_outside)
+    has_share = is_defined and not all(limit.are_open for limit in limits)
+    outside = intervals.proportion(is_outside) if has_share else intervals.UNDEFINED
     return ends, outside, np.array(shares), means
 
 

@@ -308,12 +308,25 @@ def _combined(combined: Combined, observed: Observed) -> ca.SX:
     return COMBINATIONS[combined.kind](ca.vertcat(*values))
 
 
+def _least(values: ca.SX) -> ca.SX:
+    return _if_all_finite(values, ca.mmin(values))
+
+
+def _largest(values: ca.SX) -> ca.SX:
+    return _if_all_finite(values, ca.mmax(values))
+
+
+def _if_all_finite(values: ca.SX, result: ca.SX) -> ca.SX:
+    """Return a result; NaN if any of the values is undefined, which casadi's minimum and maximum leave out."""
+    return ca.if_else(ca.fabs(ca.sum1(values)) < np.inf, result, np.nan)
+
+
 EXPRESSIONS: Mapping[type[NominalMeasurement], Callable[[Any, Observed], ca.SX]] = {
     Heights: _least_height, FaceGap: _face_gap, PlaneClearance: _plane_clearance, RoundClearance: _round_clearance,
     MeshClearance: _mesh_clearance, AxisPair: _axis_distance, DirectionPair: _angle, Combined: _combined,
     LinearForm: _linear_form,
 }  # fmt: skip
 COMBINATIONS: Mapping[str, Callable[[ca.SX], ca.SX]] = {
-    "minimum": ca.mmin, "maximum": ca.mmax, "mean": lambda values: ca.sum1(values) / values.numel(), "sum": ca.sum1,
+    "minimum": _least, "maximum": _largest, "mean": lambda values: ca.sum1(values) / values.numel(), "sum": ca.sum1,
     "difference": lambda values: values[0] - values[1],
 }  # fmt: skip

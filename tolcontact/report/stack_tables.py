@@ -7,7 +7,17 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.report.table import AnalysisReport, Table, by_measure, grouped, lost_realizations, number, percent, unresolved
+from tolcontact.report.table import (
+    AnalysisReport,
+    Table,
+    by_measure,
+    grouped,
+    lost_realizations,
+    not_a_number,
+    number,
+    percent,
+    unresolved,
+)
 from tolcontact.statistics.capability import MIN_TAIL
 
 MAX_POSITIONS = 12  # rows of a table; of more, some evenly spaced ones are shown
@@ -66,6 +76,9 @@ def _remarks(dataset: xr.Dataset, centred: float, rss: float) -> Iterator[str]:
             continue
         where = "" if is_without_contact else f", {word}"
         if not np.isfinite(dataset["simulated"].sel(state=state)).all():
+            if dataset.attrs["realizations"] >= MIN_TAIL:
+                yield f"RSS{where} is not judged: the measurement is not a number in some realizations."
+                continue
             yield f"RSS{where} is not judged: {MIN_TAIL} realizations bound the range, give --samples {MIN_TAIL} or more."
             continue
         misses = []
@@ -93,7 +106,9 @@ def sweep_report(dataset: xr.Dataset) -> AnalysisReport:
     ]
     rows = [row for measure in by_measure(dataset) for row in _rows(measure)]
     heading = ["", "mean", "6 sigma", "outer\npercentile", "mostly at"]
-    envelope = Table("", heading, rows, ["outer percentile: 0.135 % of the least values, 99.865 % of the largest"])
+    remarks = ["outer percentile: 0.135 % of the least values, 99.865 % of the largest"]
+    remarks += [remark for measure in by_measure(dataset) for remark in _undefined(measure)]
+    envelope = Table("", heading, rows, remarks)
     count = f"{grouped(dataset.attrs['realizations'])} realizations at {dataset.sizes['position']} positions"
     return AnalysisReport("Mechanism", count, notes, [envelope, _means(dataset)])
 
@@ -101,7 +116,7 @@ def sweep_report(dataset: xr.Dataset) -> AnalysisReport:
 def _rows(measure: xr.Dataset) -> list[list[str]]:
     """Return the rows of a measure: its share outside, and both ends of its envelope in both states."""
     rows = [[f"{measure['measure'].values} ({measure['measure_units'].values})", "", "", "", ""]]
-    has_limits = not np.isnan(measure["outside"].values).any()
+    has_limits = bool(np.isfinite(measure["outside"].values).any())
     for word, state in zip(terms.STATE_WORDS, terms.STATES, strict=True):
         in_state = measure.sel(state=state)
         rows.append([f"  {word}", "", "", "", ""])
@@ -109,10 +124,18 @@ def _rows(measure: xr.Dataset) -> list[list[str]]:
             figures = [number(values) for values in in_state["envelope"].sel(end=end).values]
             shares = in_state["extreme_share"].sel(end=end).values
             place = f"{_position(measure, int(shares.argmax()))} ({100 * shares.max():.0f} %)"  # of most realizations
-            rows.append([f"    {extreme}", *figures, place])
+            rows.append([f"    {extreme}", *figures, place if shares.any() else "-"])
         if has_limits:
             rows.append(["    beyond limits", percent(in_state["outside"].values), "", "", "at any position"])
     return rows
+
+
+def _undefined(measure: xr.Dataset) -> Iterator[str]:
+    """Yield a remark on a measure that is not a number in some realizations."""
+    is_undefined = measure["swept"].isnull().any(["position", "state"])
+    if count := int(is_undefined.sum()):
+        share = not_a_number(count, is_undefined.size)
+        yield f"{measure['measure'].values}: {share} at some position, so it has no envelope"
 
 
 def _position(dataset: xr.Dataset, index: int) -> str:

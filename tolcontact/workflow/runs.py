@@ -22,7 +22,20 @@ from tolcontact.simulation.surfaces import check_surfaces, simulated_poses, warn
 from tolcontact.statistics import STATISTICS, estimate_of
 from tolcontact.statistics.measure_statistics import HALF_WIDTH, StatisticRequest
 from tolcontact.temporary import temporary_folder
-from tolcontact.vocabulary import FIELD_CHOICES, KEPT, OBJECTIVES_GROUP, OUTSIDE, PLANS, PPM, FieldChoice, Kept, Plan
+from tolcontact.vocabulary import (
+    CORRECTED,
+    FIELD_CHOICES,
+    KEPT,
+    MEASURED,
+    OBJECTIVES_GROUP,
+    OUTSIDE,
+    PLANS,
+    PPM,
+    STATES,
+    FieldChoice,
+    Kept,
+    Plan,
+)
 from tolcontact.workflow.accessor import Results
 from tolcontact.workflow.forecast import announce
 from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
@@ -90,7 +103,10 @@ class Target:
         """Return a sentence that states why the interval of finished results is not narrow enough; empty if it is."""
         estimate, half, target_half = self._widths(results)
         if math.isnan(estimate):
-            return f"{self.statistic} of {self.measure} has no value (are there limits?); no more realizations were added"
+            values = results.to_dataset()[MEASURED.name].sel(measure=self.measure, state=STATES[CORRECTED])
+            is_undefined = not np.isfinite(values[: int(results.attrs["samples"])]).all()
+            reason = "it is not a number in some realizations" if is_undefined else "are there limits?"
+            return f"{self.statistic} of {self.measure} has no value ({reason}); no more realizations were added"
         if half <= target_half:
             return ""
         stated = f"{estimate:.6g} without an interval" if math.isnan(half) else f"{estimate:.6g} +- {half:.2g}"
