@@ -84,9 +84,9 @@ def linear_model(program: Program) -> LinearModel:
         [(ahead - behind).T / (2 * step) for ahead, behind in zip(*sides, strict=True)]
         for sides, step in ((varied, steps), (moved, STEP))
     )
-    weights = reaches / steps, np.ones(len(_freedoms(program)))
     kinked = np.array([
-        _kinks(*(ends[0] - measures for ends in sides), weight) for sides, weight in zip((varied, moved), weights, strict=True)
+        _kinks(ahead[0] - measures, behind[0] - measures, weights)
+        for (ahead, behind), weights in ((varied, reaches / steps), (moved, np.ones(len(_freedoms(program)))))
     ])  # fmt: skip
     return LinearModel(
         measures, by_deviations[0], by_motion[0], kinked, gaps, by_deviations[1], by_motion[1], _bilateral_motions(program),
