@@ -94,3 +94,19 @@ def test_angles_of_planes_and_axes(turn):
     difference = (azimuths[1] - azimuths[0] - found[:, 1] + np.pi / 2) % np.pi - np.pi / 2
     np.testing.assert_allclose(difference, 0, atol=1e-9)
     assert np.abs(compiled(assembly).nominal_measures).max() <= np.pi / 2 + 1e-9
+
+
+@pytest.mark.parametrize("is_swapped", [False, True])
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0.4, -1.1, 0.7), (1, 2, 0.3)])
+def test_a_right_angle_of_a_plane_and_an_axis_is_positive_in_any_frame(turn, is_swapped):
+    """The sense of a fitted axis depends on the frame, and the angle about a direction does not."""
+    frame = Rotation.from_rotvec(turn)
+    model = tc.Assembly("square")
+    box = model.part("box", tc.Box(10, 10, 10), rotation=turn, fixed=True)
+    pin = model.part("pin", tc.Mesh(trimesh.creation.cylinder(5, 30)), at=frame.apply([20, 0, 0]), rotation=turn)
+    points = {"X1": ((0, 0, 10), "x"), "X2": ((0, 0, -10), "x"), "Y1": ((0, 0, 10), "y"), "Y2": ((0, 0, -10), "y")}
+    points |= {"Z": ((0, 0, -15), "z"), "T": ((5, 0, 0), "y")}
+    model.locate(pin, [tc.Locator(name, point, along, 0.1) for name, (point, along) in points.items()])
+    faces = (box.face("+x"), pin.face(ROUND))
+    model.measure("angle", tc.Angle(*(reversed(faces) if is_swapped else faces), about=tuple(frame.apply([0, 1, 0]))))
+    assert compiled(model).nominal_measures == pytest.approx([np.pi / 2], abs=1e-9)

@@ -218,7 +218,7 @@ class Angle(_OfTwoFaces):
     nominally. Without `about`, as in `tc.Angle(top, base)`, it is the angle between the two directions in space, from 0 on.
 
     about   a direction, fixed in the assembly frame: the rotation about it that makes the first direction coincide with the
-            second one, both seen along it, from -pi to pi
+            second one, both seen along it, from -pi to pi. A nominally right angle with an axis is positive.
     """
 
     kind, units, directions = "angle", "rad", ("about",)

@@ -17,6 +17,7 @@ from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import Faults, GeometryFault, designation, nearest_name
+from tolcontact.features import AxisFeature
 from tolcontact.geometry.analytic_surfaces import Cylinder, axes_across
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.nearest_elements import nearest_elements
@@ -28,6 +29,7 @@ DEFAULT_PLACES, FORM_PLACES, MAX_PLACES = 200, 600, 4000  # by default, of a fac
 MIN_SHARE = 0.04  # of a face, under the other one: smaller regions have fewer points
 MAX_FACING = 0.0  # cosine between the normals of faces that do not face each other
 OBTUSE = -1e-9  # cosine of an angle that counts as more than a right one
+RIGHT = 1e-6  # cosine of an angle that counts as a right one: axes of meshes are less accurate than planes
 MAX_EDGE_PAIRS = 2500  # of two rims, between which crossings are found at every pose; more take longer than contact itself
 NO_LINES = np.zeros((0, 2, 3))
 
@@ -262,8 +264,13 @@ def _angle(angle: declared.Angle, faces: MeasuredFaces) -> measured.DirectionPai
     for vector, face in zip(across, angle.faces, strict=True):
         if np.linalg.norm(vector) < PARALLEL:
             raise GeometryFault(f"the direction of {face} is parallel to the direction that the angle is about; choose another")
-    if across[0] @ across[1] < OBTUSE * np.linalg.norm(across[0]) * np.linalg.norm(across[1]):
-        v = -v
+    cosine = float(across[0] @ across[1] / np.prod(np.linalg.norm(across, axis=1)))
+    has_axis = any(isinstance(face.geometry, AxisFeature) for face in (moving, reference))
+    if about is not None and has_axis and abs(cosine) <= RIGHT:  # an axis has no sense, so that the angle is positive
+        is_reversed = float(about @ np.cross(across[0], across[1])) < 0
+    else:
+        is_reversed = cosine < OBTUSE
+    v = -v if is_reversed else v
     length = min(float(face.surface.mesh.scale) for face in (moving, reference)) / 2
     starts = [np.asarray(face.surface.mesh.bounds).mean(axis=0) for face in (moving, reference)]
     lines = np.array([[start, start + length * vector] for start, vector in zip(starts, (u, v), strict=True)])
