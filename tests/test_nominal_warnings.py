@@ -113,6 +113,19 @@ def test_warnings_do_not_depend_on_the_frame(turn):
     assert kinds(model(at=(20, 12.5, 13), turn=turn)) == ["gap"]
 
 
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0.4, -1.1, 0.7), (1, 2, 0.3)])
+def test_a_point_on_an_edge_is_doubtful_by_the_face_that_moves_it_in_any_frame(turn):
+    """Of the faces at a corner, the bottom moves along z alone, and the measure along x depends on the end."""
+    a = tc.Assembly("corner")
+    block = a.part("block", tc.Box(50, 30, 20), rotation=turn, fixed=True)
+    block.feature("top", block.face("+z"), datum="A")
+    block.feature("bottom", block.face("-z"), tc.Profile(0.4, "A"))
+    end = block.feature("end", block.face("-x"), tc.Profile(0.4, "A"))
+    a.measure("x", block.point(0, 0, 0), to=end.point(0, 30, 0), along=tuple(Rotation.from_rotvec(turn).apply((1, 0, 0))))
+    (text,) = [text for text in warned(a) if 'measurement "x"' in text]
+    assert re.search(r'lies on feature "end" of block, which deviates there by 0\.[12]\d* mm', text)
+
+
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, -1.2, 0.7)])
 @pytest.mark.parametrize(("width", "is_doubtful"), [(2, True), (20, False)])
 def test_contact_along_a_line_does_not_hold_a_rotation(turn, width, is_doubtful):

@@ -18,6 +18,7 @@ from tolcontact.plausibility.declared_points import location_designation
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws
 
 MIN_MOTION = 1e-9  # mm, at three sigma
+MIN_COSINE = 1e-6  # of a face's normal and a measured direction: smaller ones are rounding
 LISTED = 3  # features by name
 
 
@@ -191,8 +192,9 @@ def _unfollowed(draws: TrialDraws, uses: Sequence[Use]) -> list[tuple[int, Nomin
             normals, distances = surface.normals(numbers_of_triangles, feet) @ R_WP.T, np.linalg.norm(feet - places, axis=1)
             for row in np.flatnonzero(distances <= ON_FACE * surface.mesh.scale):
                 use, normal = uses[numbers[row]], normals[row]
-                motion = _motion(draws, feature.deviation(index, placement), use, normal) * abs(float(normal @ use.direction))
-                doubts += [(numbers[row], feature, motion)] * (motion > 0)
+                cosine = abs(float(normal @ use.direction))
+                motion = _motion(draws, feature.deviation(index, placement), use, normal) * cosine
+                doubts += [(numbers[row], feature, motion)] * (motion > MIN_MOTION and cosine > MIN_COSINE)
     return sorted(doubts, key=lambda doubt: doubt[0])
 
 
