@@ -139,16 +139,16 @@ def test_points_beside_the_rim_of_a_face_are_told():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 20, *nightly(*(seed for seed in range(2, 60, 2) if seed != 20))])
-def test_nothing_contradicts_a_certificate(seed):
-    """Random scenes: see studies/certificates, which judges many more."""
+@pytest.mark.parametrize(("seed", "samples"), [(0, 30), (20, 10), *nightly(*((seed, 30) for seed in range(2, 60, 2)))])
+def test_nothing_contradicts_a_certificate(seed, samples):
+    """Random scenes: see studies/certificates, which judges many more. In the scene of seed 20, many are rescued in vain."""
     runs = []
     for solver in SOLVERS:
         assembly, method = scene(seed)
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", r"\[coarse\]", tc.NominalWarning)
             try:
-                program, run = simulate(assembly, samples=30, solver=solver, method=method)
+                program, run = simulate(assembly, samples=samples, solver=solver, method=method)
             except tc.TolcontactError as error:
                 pytest.skip(f"the scene is refused: {error}")
         assert not +contradictions(program, run)
