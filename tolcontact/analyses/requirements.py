@@ -114,7 +114,7 @@ class Requirement:
 
         For a share the margin is a quantile of the distances within the limits. It changes continuously with the values,
         while a count of values outside jumps. Limits that are stops need no margin (see without_stops).
-        `shares`, whose quantiles are averaged, and the `index` replace those of the requirement.
+        `shares`, whose quantiles are averaged, and the `index` replace the share and the index of the requirement.
         """
         shares = self.share if shares is None else shares
         if self.is_share:

@@ -120,7 +120,7 @@ class Guard:
         return way._replace(feet=_at(back, way.feet), normals=np.einsum("nij,nj->ni", pose.rotation(back), way.normals))
 
     def _ways_of_bodies(self, X: np.ndarray, deviations: np.ndarray, directions: np.ndarray | None) -> WayOut:
-        """Return how the bodies separate, in their own frames, at poses (n, 12) of the moving one in that of the other one."""
+        """Return how the bodies separate, in their own frames, at poses (n, 12) of the moving body relative to the other."""
         if not self.is_swapped:
             return self.neighbours.ways_out(X, deviations, directions)
         R = pose.rotation(X)

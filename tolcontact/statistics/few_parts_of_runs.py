@@ -58,7 +58,7 @@ class MeasureOfRun(NamedTuple):
 
 
 def widened_changes(estimates: list[Estimate], of_run: MeasureOfRun, of_reference: MeasureOfRun) -> list[Estimate]:
-    """Return `CHANGES_OF_RUNS` from a reference run with wider intervals, from those of the realizations alone."""
+    """Return `CHANGES_OF_RUNS` from a reference run, with the intervals of the realizations alone made wider."""
     runs = of_run, of_reference
     indices = [run.few_parts for run in runs]
     known = [
@@ -96,7 +96,7 @@ def _have_same_distributions(worlds: Worlds | None, reference: Worlds | None) ->
 
 
 def _difference(change: Estimate, outside: Estimate, reference: Estimate) -> tuple[float, float]:
-    """Return the bounds of a difference of shares, from those of both shares, and at least those of the realizations."""
+    """Return the bounds of a difference of shares, from the bounds of both, and no closer than the realizations give."""
     lower = change.value - math.hypot(outside.value - outside.lower, reference.upper - reference.value)
     upper = change.value + math.hypot(outside.upper - outside.value, reference.value - reference.lower)
     return (min(lower, change.lower), max(upper, change.upper)) if math.isfinite(change.value) else change[1:]

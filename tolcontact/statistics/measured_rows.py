@@ -1,6 +1,6 @@
 """Rows of measured parts: how often each occurs, which one a realization has, and their weights in a posterior draw.
 
-Also the numbers by which two runs recognize that they know a contributor from the same parts.
+Numbers identify the parts that a contributor is known from, so that two runs recognize the same parts.
 """
 
 import json
@@ -46,7 +46,7 @@ class MeasuredRows(NamedTuple):
 
 
 def measured_rows(population: Mapping[str, Any], labels: list[str], x: np.ndarray) -> MeasuredRows:
-    """Return the rows of a population, from its declaration, and those of realizations with deviations x, named by labels."""
+    """Return the rows of a declared population, and the row of each realization with deviations x, named by labels."""
     columns, gauge, lots = (tuple(population.get(name, ())) for name in ("columns", "gauge", "lots"))
     drawn = Population(columns, np.array(population["values"], dtype=float), gauge=gauge, lots=lots).drawn
     values, row, counts = np.unique(drawn, axis=0, return_inverse=True, return_counts=True)

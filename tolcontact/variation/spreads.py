@@ -134,7 +134,7 @@ class ComponentZone:
     def scale(self, deviations: np.ndarray, widening: "Widening") -> np.ndarray:
         """Return the factors (n, scaled) of the scaled components for the bonus of deviations (n, contributor).
 
-        The deviations are those of widened zones: the bonus counts from the limit of the widened size, and is not widened.
+        Zones are widened already: the bonus counts from the limit of the widened size, and is not widened.
         """
         sizes, factors = np.unique(self.sizes), widening.factors[self.scaled]
         bonus = np.maximum(self.growth * (deviations[:, sizes] - widening.limits(self.limit, sizes)), 0.0)
