@@ -1,6 +1,6 @@
 """The position of a locator, within a box, that minimizes the variation of a measure, with contact."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +10,13 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import VERIFICATION_FACTOR, Analysis, Progress
+from tolcontact.analyses.requirements import Corrected
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Locator, ThreeTwoOne
 from tolcontact.discretization import Nominal, NominalPart, discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.limits import Limits
 from tolcontact.method import Solver
-from tolcontact.realizations import is_assembled
 from tolcontact.statistics import intervals
 from tolcontact.statistics.capability import share_outside
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
@@ -49,11 +49,11 @@ def relocate(
     confirm the best one.
 
     `least` is "corner height: 6 sigma", or "corner height: ppm" (the share outside its limits). Realizations that cannot be
-    assembled count as outside, and 6 sigma leaves them out, as in summaries. A coordinate that is the same
-    in both corners does not change. The locator keeps its direction, so choose corners on the surface that it contacts. All
-    trials use the same draws: first a grid and the present position, then scipy's COBYQA starting at the best of them. The
-    statistic may have several minima, or be flat: see `tried_value`. Each trial compiles a model. `progress` is called with the
-    number of trials, and their largest number.
+    assembled count as outside, and 6 sigma leaves them out, as in summaries. A coordinate that is the same in both corners does
+    not change. The locator keeps its direction, so choose corners on the surface that it contacts. All trials use the same
+    draws: first a grid and the present position, then scipy's COBYQA starting at the best of them. The statistic may have
+    several minima, or be flat: see `tried_value`. Each trial compiles a model. `progress` is called with the number of trials,
+    and their largest number.
     `model`, `samples` (4096 by default), `seed`, `solver`, `method`, `into` and `client` are as in all analyses (see
     tolcontact.analyses). Raises OptionError for a locator, a box or a measure that does not exist.
 
@@ -69,13 +69,13 @@ def relocate(
     trials.search()
     best = trials.best
     before, after = (trials.measured(point, fresh=True) for point in (trials.point, best))
-    if not after.estimate(limits).value < before.estimate(limits).value:
+    if not _estimate(after, limits).value < _estimate(before, limits).value:
         best, after = trials.point, before
     values = {
         "point": [trials.point, best],
-        "reached": [before.estimate(limits), after.estimate(limits)],
+        "reached": [_estimate(before, limits), _estimate(after, limits)],
         "change": _change(before, after, limits),
-        "unresolved": [before.unresolved, after.unresolved],
+        "unresolved": [int((~run.is_resolved).sum()) for run in (before, after)],
         "tried": trials.points,
         "tried_value": trials.values,
     }
@@ -99,48 +99,25 @@ def _goal(least: str, program: Program) -> tuple[int, Limits | None, str]:
     return measure, limits, "1"
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """A corrected measure of realizations.
-
-    x       (n,)
-    status  (n,)
-    """
-
-    x: np.ndarray
-    status: np.ndarray
-
-    @property
-    def is_assembled(self) -> np.ndarray:
-        """Whether each realization can be assembled, (n,)."""
-        return is_assembled(self.status)
-
-    @property
-    def unresolved(self) -> int:
-        """The number of unresolved realizations."""
-        return int(np.isin(self.status, terms.UNRESOLVED).sum())
-
-    def estimate(self, limits: Limits | None) -> Estimate:
-        """Return the share outside limits or not assemblable, or 6 sigma without limits, with its interval."""
-        existing = self.x[self.is_assembled]
-        if limits is not None:
-            return share_outside(Sample.of(existing), limits, len(self.x) - len(existing))
-        return intervals.standard_deviation(existing, times=6) if len(existing) >= MIN_VALUES else UNDEFINED
+def _estimate(corrected: Corrected, limits: Limits | None) -> Estimate:
+    """Return the share outside limits or not assemblable, or 6 sigma without limits, with its interval."""
+    existing = corrected.existing(0)
+    if limits is not None:
+        return share_outside(Sample.of(existing), limits, corrected.count - len(existing))
+    return intervals.standard_deviation(existing, times=6) if len(existing) >= MIN_VALUES else UNDEFINED
 
 
-def _change(before: Measured, after: Measured, limits: Limits | None) -> Estimate:
+def _change(before: Corrected, after: Corrected, limits: Limits | None) -> Estimate:
     """Return the change between realizations of the same draws: a ratio of 6 sigma, or a difference of shares."""
     if after is before:
         return Estimate(*[float(limits is None)] * 3)
-    if limits is None:
-        both = before.is_assembled & after.is_assembled
-        return (
-            Estimate(*np.sqrt(intervals.variance_ratio(after.x[both], before.x[both])))
-            if both.sum() >= MIN_VALUES
-            else UNDEFINED
-        )
-    hits = [Sample.of(limits.outside(measured.x) | ~measured.is_assembled) for measured in (after, before)]
-    return intervals.share_shift(*hits, paired=True)
+    if limits is not None:
+        hits = [Sample.of(limits.outside(run.values[:, 0]) | ~run.is_assembled) for run in (after, before)]
+        return intervals.share_shift(*hits, paired=True)
+    both = before.is_assembled & after.is_assembled
+    if both.sum() < MIN_VALUES:
+        return UNDEFINED
+    return Estimate(*np.sqrt(intervals.variance_ratio(after.values[both, 0], before.values[both, 0])))
 
 
 class TrialPositions:
@@ -181,8 +158,8 @@ class TrialPositions:
         """The best position so far, (3,) [mm]."""
         return self.points[int(np.nanargmin(self.values))]
 
-    def measured(self, point: np.ndarray, *, fresh: bool = False) -> Measured:
-        """Return the corrected measure with the locator at a point (3,) [mm].
+    def measured(self, point: np.ndarray, *, fresh: bool = False) -> Corrected:
+        """Return the measure of the goal alone, with the locator at a point (3,) [mm].
 
         A `fresh` run has other draws, and more of them.
         """
@@ -198,7 +175,7 @@ class TrialPositions:
         measured, status = analysis.of(compile_program(nominal, solver, method)).simulate(
             start or analysis.samples, start=start
         )
-        return Measured(measured[:, terms.CORRECTED, self._measure].copy(), status)
+        return Corrected(measured[:, terms.CORRECTED, [self._measure]], status)
 
     def search(self) -> None:
         """Try a grid of positions and the declared one, and then further ones, starting at the best one."""
@@ -226,7 +203,7 @@ class TrialPositions:
     def _attempt(self, point: np.ndarray) -> float:
         """Return the value of the goal at a position (3,) [mm], also outside the box; infinite if there is no model."""
         try:
-            value = self.measured(point).estimate(self._limits).value
+            value = _estimate(self.measured(point), self._limits).value
         except ModelError:
             value = np.inf
         self.points.append(point)

@@ -62,6 +62,8 @@ class Worlds:
     luck         (world,) numbers between 0 and 1 for the error of the run itself
     sources      (contributor + population,) numbers of what each is known from: equal sources have the same draws in all runs
                  that have them, and other sources independent ones; None draws all of a run together, which spreads them better
+                 (the attribute is the set of the numbers that belong to few parts)
+    has_rows     whether there are populations
     """
 
     def __init__(
@@ -86,7 +88,6 @@ class Worlds:
         self._correlation = np.atleast_2d(np.corrcoef(x.T)) if len(n) else np.zeros((0, 0))
         self._row_weights = [rows.weights(r, WORLDS) for rows, r in zip(populations, generators, strict=True)]
         self.luck, self._unseen = u[:, 0], u[:, 1]
-
         self.has_rows = bool(populations)
         few = range(len(parts), len(sources)) if sources is not None else ()
         self.sources = frozenset(sources[k] for k in (*self._columns, *few)) if sources is not None else frozenset[int]()
