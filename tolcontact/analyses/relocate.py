@@ -69,11 +69,11 @@ def relocate(
     trials.search()
     best = trials.best
     before, after = (trials.measured(point, fresh=True) for point in (trials.point, best))
-    if not _estimate(after, limits).value < _estimate(before, limits).value:
+    if not goal_estimate(after, limits).value < goal_estimate(before, limits).value:
         best, after = trials.point, before
     values = {
         "point": [trials.point, best],
-        "reached": [_estimate(before, limits), _estimate(after, limits)],
+        "reached": [goal_estimate(before, limits), goal_estimate(after, limits)],
         "change": _change(before, after, limits),
         "unresolved": [int((~run.is_resolved).sum()) for run in (before, after)],
         "tried": trials.points,
@@ -99,7 +99,7 @@ def _goal(least: str, program: Program) -> tuple[int, Limits | None, str]:
     return measure, limits, "1"
 
 
-def _estimate(corrected: Corrected, limits: Limits | None) -> Estimate:
+def goal_estimate(corrected: Corrected, limits: Limits | None) -> Estimate:
     """Return the share outside limits or not assemblable, or 6 sigma without limits, with its interval."""
     existing = corrected.existing(0)
     if limits is not None:
@@ -203,7 +203,7 @@ class TrialPositions:
     def _attempt(self, point: np.ndarray) -> float:
         """Return the value of the goal at a position (3,) [mm], also outside the box; infinite if there is no model."""
         try:
-            value = _estimate(self.measured(point), self._limits).value
+            value = goal_estimate(self.measured(point), self._limits).value
         except ModelError:
             value = np.inf
         self.points.append(point)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolcontact.analyses.relocate import Measured
+from tolcontact.analyses.relocate import goal_estimate
 from tolcontact.analyses.requirements import Corrected, Requirement
 from tolcontact.limits import Limits
 from tolcontact.vocabulary import Status
@@ -24,8 +24,10 @@ def test_they_are_outside_limits_and_a_ppk_leaves_them_out():
 
 def test_they_are_outside_limits_at_each_position_of_a_locator_and_6_sigma_leaves_them_out():
     status = np.array([Status.RESOLVED] * 60 + [Status.NOT_ASSEMBLABLE] * 40)
-    x = np.where(status == Status.RESOLVED, np.tile([-0.1, 0.1], 50), 5.0)
-    measured, better = Measured(x, status), Measured(x, np.full(100, Status.RESOLVED))
-    assert measured.estimate(Limits(-9.0, 9.0)).value == 0.4 and better.estimate(Limits(-9.0, 9.0)).value == 0
-    assert measured.estimate(None).value == pytest.approx(6 * x[:60].std(ddof=1))
-    assert np.isnan(Measured(x, np.full(100, Status.NOT_ASSEMBLABLE)).estimate(None).value)
+    values = np.where(status == Status.RESOLVED, np.tile([-0.1, 0.1], 50), 5.0)[:, None]
+    statuses = status, np.full(100, Status.RESOLVED), np.full(100, Status.NOT_ASSEMBLABLE)
+    run, better, none = (Corrected(values, of_run) for of_run in statuses)
+    limits = Limits(-9.0, 9.0)
+    assert goal_estimate(run, limits).value == 0.4 and goal_estimate(better, limits).value == 0
+    assert goal_estimate(run, None).value == pytest.approx(6 * values[:60].std(ddof=1))
+    assert np.isnan(goal_estimate(none, None).value)
